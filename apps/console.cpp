@@ -1,0 +1,138 @@
+#include "console.h"
+
+#include <holdfast/io/cloud_io.h>
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <sstream>
+#include <utility>
+
+namespace holdfast {
+namespace {
+
+constexpr int kBarWidth = 30;
+
+/// The clouds a path stands for.
+std::vector<std::string>
+cloudsOf(const std::string& path)
+{
+  namespace fs = std::filesystem;
+  std::error_code error;
+  if (!fs::is_directory(path, error))
+    return {path};
+  std::vector<std::string> clouds;
+  for (fs::directory_iterator it(path, error), end; !error && it != end;
+       it.increment(error))
+    if (it->is_regular_file() && it->path().filename().string()[0] != '.' &&
+        isCloudFile(it->path().string()))
+      clouds.push_back(it->path().string());
+  if (error)
+    throw std::runtime_error(path + ": cannot be listed: " + error.message());
+  if (clouds.empty())
+    throw std::runtime_error(path + ": holds no cloud");
+  std::sort(clouds.begin(), clouds.end());
+  return clouds;
+}
+
+} // namespace
+
+void
+printError(const std::string& message)
+{
+  std::cerr << "holdfast: " << message << std::endl;
+}
+
+void
+printNotice(const std::string& message)
+{
+  printError("note: " + message);
+}
+
+int
+forEachCloud(const std::vector<std::string>& paths,
+             const std::function<bool(const std::string&)>& work)
+{
+  int exit_code = 0;
+  const auto attempt = [&exit_code](const auto& step) {
+    try {
+      if (!step())
+        exit_code = 1;
+    }
+    catch (const std::exception& error) {
+      printError(error.what());
+      exit_code = 1;
+    }
+  };
+  for (const std::string& path : paths)
+    attempt([&] {
+      for (const std::string& cloud : cloudsOf(path))
+        attempt([&] { return work(cloud); });
+      return true;
+    });
+  return exit_code;
+}
+
+ProgressBar::ProgressBar(std::string label, bool enabled)
+: label_(std::move(label)), enabled_(enabled && ::isatty(STDERR_FILENO) == 1)
+{}
+
+ProgressBar::~ProgressBar()
+{
+  if (percent_ >= 0)
+    std::cerr << "\r\x1b[K" << std::flush;
+}
+
+void
+ProgressBar::update(int done, int total)
+{
+  const int percent = total > 0 ? static_cast<int>(100LL * done / total) : 100;
+  if (!enabled_ || percent == percent_)
+    return;
+  percent_ = percent;
+  const auto full = static_cast<std::size_t>(kBarWidth * percent / 100);
+  std::cerr << '\r' << label_ << " [" << std::string(full, '#')
+            << std::string(kBarWidth - full, ' ') << "] " << percent << " %"
+            << std::flush;
+}
+
+double
+Stopwatch::milliseconds() const
+{
+  const std::chrono::duration<double, std::milli> elapsed =
+      std::chrono::steady_clock::now() - start_;
+  return elapsed.count();
+}
+
+std::string
+formatTable(const std::vector<std::vector<std::string>>& rows)
+{
+  std::vector<std::size_t> widths;
+  for (const auto& row : rows) {
+    widths.resize(std::max(widths.size(), row.size()));
+    for (std::size_t j = 0; j < row.size(); ++j)
+      widths[j] = std::max(widths[j], row[j].size());
+  }
+  std::ostringstream out;
+  for (const auto& row : rows) {
+    for (std::size_t j = 0; j < row.size(); ++j) {
+      const std::string padding(widths[j] - row[j].size(), ' ');
+      out << (j == 0 ? "" : "  ") << (j == 0 ? row[j] + padding : padding + row[j]);
+    }
+    out << '\n';
+  }
+  return out.str();
+}
+
+std::string
+formatNumber(const char* format, double value)
+{
+  char text[64];
+  std::snprintf(text, sizeof(text), format, value);
+  return text;
+}
+
+} // namespace holdfast

@@ -1,0 +1,40 @@
+/// \file The options that say what a cloud comes from.
+#pragma once
+
+#include <holdfast/io/cloud_io.h>
+#include <holdfast/sensor/sensor.h>
+
+#include <CLI/App.hpp>
+
+#include <string>
+#include <vector>
+
+namespace holdfast {
+
+struct InputOptions {
+  std::vector<std::string> clouds; ///< files and folders
+  std::string sensor_name = "kinect_v1";
+  double depth_scale = 1000.0;
+  bool depth_scale_given = false;
+};
+
+/// Adds CLOUD..., --sensor and --depth-scale. `options` must outlive the parsing.
+void addInputOptions(CLI::App& command, InputOptions& options);
+
+/// \throw CLI::ValidationError when there is no such sensor.
+Sensor loadSensorOption(const InputOptions& options);
+
+LoadOptions loadOptions(const InputOptions& options, const Sensor& sensor);
+
+/// What the user should know about the file and how it was read, one line each.
+std::vector<std::string> inputNotices(const InputOptions& options,
+                                      const CloudFileInfo& info);
+
+/// Accepts positive finite numbers; `unit` is shown in the help.
+CLI::Validator positiveNumber(const std::string& unit);
+
+/// Shortens what the help says behind each option to "VALUES [DEFAULT]". To be called
+/// when all options are there.
+void tidyHelp(CLI::App& command);
+
+} // namespace holdfast

@@ -1,0 +1,73 @@
+#include "commands.h"
+#include "console.h"
+
+#include <holdfast/version.h>
+
+#include <CLI/CLI.hpp>
+
+#include <exception>
+#include <iostream>
+#include <string>
+
+namespace {
+
+constexpr const char* kExamples = R"(Examples:
+  holdfast simulate rocks -o rocks.pcd      a cloud of a simulated scene
+  holdfast info rocks.pcd                   what is in a cloud
+  holdfast fit rocks.pcd                    patches all over it, as a table
+  holdfast fit rocks.pcd -o results         and as JSON and a coloured mesh
+  holdfast fit can.pcd --whole --surface cylinder --json -
+                                            one patch to all points, as JSON
+
+'holdfast COMMAND --help' explains a command.
+Exit codes: 0 all done, 1 something failed, 2 wrong usage.
+)";
+
+/// Standard output may be a full disk.
+int
+flushed(int exit_code)
+{
+  if (std::cout.flush())
+    return exit_code;
+  holdfast::printError("standard output cannot be written");
+  return 1;
+}
+
+int
+run(int argc, char** argv)
+{
+  CLI::App app("Holdfast: bounded curved contact patches with their covariance, from "
+               "depth clouds.");
+  app.footer(kExamples);
+  app.set_version_flag("--version", "holdfast " HOLDFAST_VERSION);
+  app.require_subcommand(1);
+  int exit_code = 0;
+  holdfast::addFitCommand(app, exit_code);
+  holdfast::addInfoCommand(app, exit_code);
+  holdfast::addSimulateCommand(app, exit_code);
+  try {
+    app.parse(argc, argv);
+    return flushed(exit_code);
+  }
+  catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) // --help and --version
+      return flushed(app.exit(error));
+    const std::string message = error.what();
+    holdfast::printError(message.substr(0, message.find('\n')));
+    return 2;
+  }
+}
+
+} // namespace
+
+int
+main(int argc, char** argv)
+{
+  try {
+    return run(argc, argv);
+  }
+  catch (const std::exception& error) {
+    holdfast::printError(error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,116 @@
+#include "summary.h"
+
+#include "console.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+namespace holdfast {
+namespace {
+
+using Measure = std::function<double(const FitResult&)>;
+using Fits = std::vector<const FitResult*>;
+
+double
+median(const Fits& fits, const Measure& measure)
+{
+  std::vector<double> values;
+  for (const FitResult* fit : fits)
+    values.push_back(measure(*fit));
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+double
+chi2PerDof(const FitResult& fit)
+{
+  return fit.chi2_dof > 0 ? fit.chi2 / fit.chi2_dof : 0.0;
+}
+
+/// A turn by delta about the local x and y axes moves the normal by as much.
+double
+normalSigmaDegrees(const FitResult& fit)
+{
+  const ParameterMatrix tangent = toTangent(fit.patch, fit.covariance);
+  const int r = layoutOf(fit.patch.type).r();
+  return std::sqrt(tangent(r, r) + tangent(r + 1, r + 1)) * 180.0 / M_PI;
+}
+
+double
+centreSigmaMillimetres(const FitResult& fit)
+{
+  const int c = layoutOf(fit.patch.type).c();
+  return 1e3 * std::sqrt(fit.covariance.diagonal().segment(c, 3).sum());
+}
+
+/// The principal curvature of larger magnitude.
+double
+curvature(const FitResult& fit)
+{
+  const Eigen::Vector2d kappa = fit.patch.principalCurvatures();
+  return std::abs(kappa.x()) > std::abs(kappa.y()) ? kappa.x() : kappa.y();
+}
+
+std::vector<std::string>
+tableRow(SurfaceType surface, const Fits& fits)
+{
+  const auto value = [&fits](const char* format, const Measure& measure) {
+    return formatNumber(format, median(fits, measure));
+  };
+  const bool flat = surface == SurfaceType::Plane;
+  return {std::string(surfaceName(surface)),
+          std::to_string(fits.size()),
+          value("%.0f", [](const FitResult& fit) { return fit.points; }),
+          value("%.2f", chi2PerDof),
+          value("%.2f", normalSigmaDegrees),
+          value("%.2f", centreSigmaMillimetres),
+          flat ? "-" : value("%.1f", curvature)};
+}
+
+std::string
+heading(const PatchReport& report)
+{
+  const auto patches = static_cast<double>(report.result.patches.size());
+  return report.cloud + ": " + formatNumber("%.0f", patches) +
+         (patches == 1.0 ? " patch" : " patches") + ", sensor " + report.sensor.name +
+         ", loaded in " + formatNumber("%.0f", report.load_ms) + " ms, fitted in " +
+         formatNumber("%.1f", report.fit_ms) + " ms (" +
+         formatNumber("%.0f", 1e3 * patches / std::max(report.fit_ms, 1e-6)) +
+         " patches/s)\n";
+}
+
+} // namespace
+
+std::string
+rejectedText(const std::map<FitStatus, int>& rejected)
+{
+  std::string text;
+  for (const auto& [status, count] : rejected)
+    text += (text.empty() ? "" : ", ") + std::string(statusName(status)) + ' ' +
+            std::to_string(count);
+  return text;
+}
+
+std::string
+summaryTable(const PatchReport& report)
+{
+  std::map<SurfaceType, Fits> by_surface;
+  for (const ExtractedPatch& patch : report.result.patches)
+    by_surface[patch.fit.patch.type.surface].push_back(&patch.fit);
+  std::vector<std::vector<std::string>> rows{{"surface (medians)",
+                                              "count",
+                                              "points",
+                                              "chi2/dof",
+                                              "sigma normal deg",
+                                              "sigma centre mm",
+                                              "curvature 1/m"}};
+  for (const auto& [surface, fits] : by_surface)
+    rows.push_back(tableRow(surface, fits));
+  const std::string rejected = rejectedText(report.result.rejected);
+  return heading(report) + formatTable(rows) +
+         (rejected.empty() ? "" : "rejected: " + rejected + "\n");
+}
+
+} // namespace holdfast

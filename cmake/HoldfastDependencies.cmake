@@ -1,0 +1,34 @@
+# Everything the libraries and programs stand on; tests and benchmarks add their own.
+
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(Boost 1.74 REQUIRED) # Boost.Math, headers only
+find_package(OpenMP REQUIRED COMPONENTS CXX)
+find_package(nlohmann_json 3.10 REQUIRED)
+find_package(PNG REQUIRED)
+find_package(yaml-cpp REQUIRED)
+
+# The fit kernel in vectors of whatever the processor has; without it the same
+# formulas run in plain C++.
+find_package(hwy QUIET)
+option(HOLDFAST_WITH_HIGHWAY "Vectorise the fit with Highway" ${hwy_FOUND})
+if(HOLDFAST_WITH_HIGHWAY)
+  find_package(hwy REQUIRED)
+endif()
+
+# Asking for more components (features, io, surface, segmentation) would pull in VTK
+# and Qt. The readers and writers of pcl_io need neither, so it is linked by name.
+set(HOLDFAST_PCL_COMPONENTS common kdtree search octree sample_consensus filters)
+find_package(PCL 1.12 REQUIRED COMPONENTS ${HOLDFAST_PCL_COMPONENTS})
+find_library(HOLDFAST_PCL_IO_LIBRARY pcl_io HINTS ${PCL_LIBRARY_DIRS} REQUIRED)
+mark_as_advanced(HOLDFAST_PCL_IO_LIBRARY)
+
+if(HOLDFAST_BUILD_APPS)
+  find_package(CLI11 REQUIRED)
+endif()
+
+find_package(benchmark QUIET)
+if(benchmark_FOUND AND PROJECT_IS_TOP_LEVEL)
+  option(HOLDFAST_BUILD_BENCHMARKS "Build holdfast_benchmark" ON)
+else()
+  option(HOLDFAST_BUILD_BENCHMARKS "Build holdfast_benchmark" OFF)
+endif()

@@ -1,0 +1,35 @@
+# What a user of the libraries gets, and how find_package(holdfast) finds it.
+include(CMakePackageConfigHelpers)
+
+set(config_dir ${CMAKE_INSTALL_LIBDIR}/cmake/holdfast)
+
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/include/ ${PROJECT_BINARY_DIR}/include/
+  DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/config
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/holdfast)
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
+if(TARGET holdfast)
+  install(TARGETS holdfast)
+endif()
+
+# One export set per component: core must be usable where PCL is not installed.
+foreach(component core pcl)
+  install(TARGETS holdfast_${component} EXPORT holdfast_${component}Targets)
+  install(EXPORT holdfast_${component}Targets
+    NAMESPACE holdfast::
+    DESTINATION ${config_dir})
+endforeach()
+
+list(JOIN HOLDFAST_PCL_COMPONENTS " " holdfast_pcl_components)
+configure_package_config_file(
+  ${PROJECT_SOURCE_DIR}/cmake/holdfastConfig.cmake.in
+  ${PROJECT_BINARY_DIR}/holdfastConfig.cmake
+  INSTALL_DESTINATION ${config_dir})
+# Before version 1 every minor version may change the interface.
+write_basic_package_version_file(
+  ${PROJECT_BINARY_DIR}/holdfastConfigVersion.cmake
+  COMPATIBILITY SameMinorVersion)
+install(FILES
+  ${PROJECT_BINARY_DIR}/holdfastConfig.cmake
+  ${PROJECT_BINARY_DIR}/holdfastConfigVersion.cmake
+  DESTINATION ${config_dir})

@@ -1,0 +1,35 @@
+# What is built, and how. Nothing here reaches a program that uses the library.
+
+option(HOLDFAST_BUILD_APPS "Build the program holdfast" ${PROJECT_IS_TOP_LEVEL})
+option(HOLDFAST_BUILD_TESTS "Build the tests" ${PROJECT_IS_TOP_LEVEL})
+option(HOLDFAST_BUILD_SAMPLES "Build the programs in samples/" ${PROJECT_IS_TOP_LEVEL})
+option(HOLDFAST_WERROR "Treat warnings as errors" OFF)
+set(HOLDFAST_SANITIZE "" CACHE STRING "Sanitizers, e.g. address;undefined or thread")
+
+# Shared by default, as PCL is. It is also the safer choice for programs built with
+# -march=native: in a static library the linker would keep one copy of each Eigen
+# template for both instruction sets, and their ideas of alignment differ.
+option(BUILD_SHARED_LIBS "Build shared libraries" ON)
+
+get_property(multi_config GLOBAL PROPERTY GENERATOR_IS_MULTI_CONFIG)
+if(PROJECT_IS_TOP_LEVEL AND NOT multi_config AND NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "Build type" FORCE)
+endif()
+
+set(CMAKE_CXX_STANDARD 17)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+
+if(HOLDFAST_SANITIZE)
+  list(JOIN HOLDFAST_SANITIZE "," sanitizers)
+  add_compile_options(-fsanitize=${sanitizers} -fno-omit-frame-pointer)
+  add_link_options(-fsanitize=${sanitizers})
+endif()
+
+# Warnings of one of our own targets.
+function(holdfast_set_warnings target)
+  target_compile_options(${target} PRIVATE
+    -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
+    $<$<BOOL:${HOLDFAST_WERROR}>:-Werror>)
+endfunction()

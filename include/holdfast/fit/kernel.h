@@ -1,0 +1,189 @@
+/// \file The hot path: sums over the points of one neighbourhood.
+///
+/// Raw pointers and plain structs only. The per-point mathematics is written once
+/// (src/fit/kernel_point.inl), templated on the number type: `double` gives the
+/// readable reference, SIMD vectors the fast version, chosen at run time. Everything on
+/// the sums is ordinary C++ elsewhere.
+///
+/// Notation, in the local frame q = R^T (q_world - c), Sigma = R^T Sigma_world R:
+///
+///     f = q^T G q / 2 - 2 z        implicit form, G = 2K
+///     g = df/dq = G q - 2 e_z      t = Sigma g      V = g.t      w = t^T G t / 2
+///
+/// The cost of a point is E(f, V, w): with the Sampson residual f^2/(2V), with the ray
+/// residual the halved squared Mahalanobis distance along t, whose foot q - s t solves
+/// f - s V + s^2 w = 0. Every derivative follows by the chain rule through f, V, w:
+///
+///     f_a               V_a = 2 B_a.t                 w_a = B_a.r + t^T G_a t / 2
+///     f_q = g           V_q = 2 G t                   w_q = G r          r = Sigma G t
+///
+/// with B_a = dg/dtheta_a and G_a = dG/dtheta_a. Second derivatives of f with respect
+/// to the parameters are polynomials p(q) of degree two at most, and enter through the
+/// functional L[p] = sum( E_f p + grad p.(2 E_V t + E_w r) + E_w t^T (hess p) t / 2 ),
+/// that is, through ten sums. The gradient is L[f_a].
+#pragma once
+
+#include <holdfast/fit/options.h>
+
+#include <cstdint>
+#include <vector>
+
+namespace holdfast { namespace kernel {
+
+/// Surfaces as the solver sees them, and their minimal parameters theta (shape
+/// parameters first, then translations of c along directions fixed in the local frame):
+///   Paraboloid  kxx kxy kyy, delta_x delta_y, a (along the line of the centre)
+///   Sphere      k, c_x c_y c_z
+///   Cylinder    k, delta_y delta_z, c_y c_z (axis: local x)
+///   Plane       delta_x delta_y, c_z
+/// delta is a perturbation R <- R Exp(delta).
+enum class Model : std::uint8_t { Paraboloid, Sphere, Cylinder, Plane };
+
+inline constexpr int kMaxTheta = 6;
+
+constexpr int
+shapeParameterCount(Model model)
+{
+  switch (model) {
+  case Model::Paraboloid:
+    return 5;
+  case Model::Sphere:
+    return 1;
+  case Model::Cylinder:
+    return 3;
+  case Model::Plane:
+    return 2;
+  }
+  return 0;
+}
+
+constexpr int
+parameterCount(Model model)
+{
+  switch (model) {
+  case Model::Paraboloid:
+    return 6;
+  case Model::Sphere:
+    return 4;
+  case Model::Cylinder:
+    return 5;
+  case Model::Plane:
+    return 3;
+  }
+  return 0;
+}
+
+/// Index of entry (row, column), row <= column, in a packed upper triangle of size n.
+constexpr int
+packed(int row, int column, int n)
+{
+  return row * n - row * (row - 1) / 2 + column - row;
+}
+
+/// Where the points are: channels in the order of PointBatch::Channel.
+struct Points {
+  const double* channel[10];
+  int padded_size; ///< multiple of PointBatch::kLaneMultiple
+};
+
+/// Surface at which the sums are taken; coordinates relative to the batch's origin.
+struct State {
+  double R[9]; ///< row-major, local to world
+  double c[3]; ///< origin of the local frame
+  double k[3]; ///< paraboloid kxx kxy kyy; sphere, cylinder k 0 0; plane unused
+  double line[3]; ///< paraboloid: unit direction of the line of c, local frame
+  double centroid[3]; ///< mean of the points, local frame (accumulateCovariance only)
+};
+
+/// Moments of the points; symmetric matrices as xx xy xz yy yz zz.
+struct ScatterSums {
+  double q[3];
+  double qq[6];
+  double sigma[6];
+};
+
+/// Moments for the least-squares quadric z(x, y) over a given frame.
+struct QuadricSums {
+  /// sum x^i y^j in the order 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy, x4, x3y, x2y2,
+  /// xy3, y4
+  double monomial[15];
+  double z[6]; ///< sum z times 1, x, y, xx, xy, yy
+};
+
+/// L of 1 x y z xx yy zz xy xz yz.
+enum Polynomial { P1, PX, PY, PZ, PXX, PYY, PZZ, PXY, PXZ, PYZ, kPolynomials };
+
+/// One damped Gauss-Newton iteration's sums.
+struct NormalSums {
+  double cost;
+  double L[kPolynomials];
+  double JtJ[21]; ///< packed upper triangle of size parameterCount
+};
+
+/// Sums of the exact covariance. X_i = d^2E / dtheta dq_i is p x 3, in the local frame;
+/// symmetric index pairs in the order xx xy xz yy yz zz; qt = q - centroid.
+struct CovarianceSums {
+  double cost;
+  double L[kPolynomials];
+  double H[15]; ///< packed, shape parameters; without the L[f_ab] part
+  double X[kMaxTheta][3]; ///< sum X_i
+  double XX[21]; ///< sum X_i Sigma_i X_i^T, packed
+  double XS[kMaxTheta][3]; ///< sum X_i Sigma_i
+  double XSq[kMaxTheta][6]; ///< sum (X_i Sigma_i)_a (qt_b e_c + qt_c e_b): covariance
+                            ///< with the scatter entries bc (b == c: 2 qt_b e_b), x N
+  double S[6]; ///< sum Sigma_i
+  double qS[3][6]; ///< sum qt_a (Sigma_i)_bc
+  double qqS[6][6]; ///< sum qt_a qt_b (Sigma_i)_cd
+};
+
+void accumulateScatter(const Points& points, ScatterSums& sums);
+
+void accumulateQuadric(const Points& points,
+                       const double R[9],
+                       const double c[3],
+                       QuadricSums& sums);
+
+void accumulateNormal(Model model,
+                      Residual residual,
+                      const Points& points,
+                      const State& state,
+                      NormalSums& sums);
+
+void accumulateCovariance(Model model,
+                          Residual residual,
+                          const Points& points,
+                          const State& state,
+                          CovarianceSums& sums);
+
+/// X_i of every point (p x 3 row-major each, local frame), for stages that correlate
+/// two fits; always the reference code.
+void crossTerms(Model model,
+                Residual residual,
+                const Points& points,
+                const State& state,
+                std::vector<double>& X);
+
+/// Instruction set in use: "AVX3", "AVX2", "SSE2", ... or "scalar".
+const char* instructionSet();
+
+/// The reference code (number type double), whatever the machine offers: what tests and
+/// benchmarks compare the SIMD code with.
+namespace reference {
+void accumulateScatter(const Points& points, ScatterSums& sums);
+void accumulateQuadric(const Points& points,
+                       const double R[9],
+                       const double c[3],
+                       QuadricSums& sums);
+void accumulateNormal(Model model,
+                      Residual residual,
+                      const Points& points,
+                      const State& state,
+                      NormalSums& sums);
+void accumulateCovariance(Model model,
+                          Residual residual,
+                          const Points& points,
+                          const State& state,
+                          CovarianceSums& sums);
+} // namespace reference
+
+}} // namespace holdfast::kernel

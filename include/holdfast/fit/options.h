@@ -1,0 +1,90 @@
+/// \file What is fitted and how.
+#pragma once
+
+#include <holdfast/patch/types.h>
+
+#include <Eigen/Core>
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace holdfast {
+
+/// What the caller asks for. Auto fits a paraboloid and lets the data decide its type
+/// (stage I-3); Paraboloid makes no test: elliptic or hyperbolic by the signs. The
+/// others force that type.
+enum class SurfaceRequest : std::uint8_t {
+  Auto,
+  Paraboloid,
+  Plane,
+  Sphere,
+  CircularCylinder,
+  EllipticParaboloid,
+  HyperbolicParaboloid,
+  CylindricParaboloid,
+  CircularParaboloid
+};
+
+/// The residual that is minimised, as a function of the implicit form f(q), its
+/// gradient g and the covariance Sigma of the point.
+enum class Residual : std::uint8_t {
+  /// f / sqrt(g Sigma g^T), first order in the distance (the paper's).
+  Sampson,
+  /// Exact Mahalanobis distance along Sigma g^T; no second-order bias.
+  Ray
+};
+
+struct FitOptions {
+  SurfaceRequest surface = SurfaceRequest::Auto;
+  /// Boundary of planes; other surfaces imply theirs.
+  std::optional<BoundaryType> plane_boundary;
+  /// Gamma: share of the points, per axis and if Gaussian, that the boundary encloses.
+  double containment = 0.95;
+  /// Where the sensor stood, world frame, m: normals point to its side.
+  Eigen::Vector3d viewpoint = Eigen::Vector3d::Zero();
+
+  /// Curvatures below this are never told from zero, and closer together than this
+  /// never told apart, however sure the data are, 1/m. A floor under the tests of stage
+  /// I-3.
+  double curvature_tolerance_per_m = 0.1;
+  /// Test level of stage I-3: the probability of calling a true plane, circular or
+  /// cylindric paraboloid something more complicated.
+  double discrimination_level = 0.01;
+  /// A fit with a larger curvature is rejected, 1/m.
+  double max_curvature_per_m = 1e3;
+
+  int max_iterations = 50;
+  /// The iterations stop when the remaining Newton step is below this many sigmas.
+  double step_tolerance_sigma = 1e-4;
+  /// The final exact Newton step is repeated while it is longer than this, in sigmas.
+  /// The covariance is taken before the last step, and is right to about this (patches
+  /// that fill a small part of the view) to twenty times this (noise that bends with
+  /// the surface).
+  double polish_tolerance_sigma = 1e-6;
+  /// Points whose covariance is (nearly) zero are given this isotropic sigma, m.
+  double sigma_floor_m = 1e-6;
+
+  // Departures from the paper that make the estimate unbiased; see paper().
+  Residual residual = Residual::Sampson;
+  /// Subtract the mean point covariance from the scatter matrix before PCA and moments:
+  /// noise tilts the PCA normal and inflates the moments otherwise.
+  bool debias_scatter = true;
+  /// Normal of sphere and cylinder from the PCA, not from a weighted plane that does
+  /// not fit them.
+  bool normal_from_pca = true;
+  /// Radius of circular bounds from the mean of the two moments, not from the larger
+  /// one, which has a kink where they are equal.
+  bool smooth_circle_radius = true;
+  /// Types from chi-square tests on the curvature covariance, not from a fixed
+  /// threshold.
+  bool statistical_discrimination = true;
+
+  /// The paper's choices, all departures switched off.
+  static FitOptions paper();
+};
+
+/// Empty when the options make sense, else one sentence naming the first that does not.
+std::string validityError(const FitOptions& options);
+
+} // namespace holdfast

@@ -1,0 +1,87 @@
+/// \file The points of one neighbourhood and their covariances, laid out for the
+/// kernel.
+#pragma once
+
+#include <Eigen/Core>
+
+#include <memory>
+#include <vector>
+
+namespace holdfast {
+
+/// N points with covariances in structure-of-arrays form: ten channels
+/// x y z sxx sxy sxz syy syz szz w in one aligned block, padded to a multiple of
+/// kLaneMultiple with points of weight 0. Coordinates are relative to `origin()`, so
+/// that clouds far from zero lose no precision. Memory is kept between uses: a batch
+/// that is refilled does not allocate once it has seen its largest neighbourhood.
+class PointBatch {
+public:
+  enum Channel { X, Y, Z, SXX, SXY, SXZ, SYY, SYZ, SZZ, W, kChannels };
+  static constexpr int kLaneMultiple = 8;
+
+  /// Forgets all points; `origin` in world coordinates should be near the points to
+  /// come.
+  void clear(const Eigen::Vector3d& origin);
+
+  /// Makes room for n points without allocating later.
+  void reserve(int n);
+
+  /// Adds a world point with its covariance (world axes). No check is made here; see
+  /// removeInvalid().
+  void add(const Eigen::Vector3d& point, const Eigen::Matrix3d& covariance);
+
+  /// Drops points with a non-finite coordinate or covariance, and points whose
+  /// covariance is not positive semi-definite (within single-precision rounding).
+  /// \return how many were dropped.
+  int removeInvalid();
+
+  /// Adds floor^2 I to covariances whose trace is below floor^2, so that exact points
+  /// do not get infinite weight.
+  void applyFloor(double sigma_floor_m);
+
+  /// Brings the padding after the last point up to date. fitPatch() calls it.
+  void pad();
+
+  int size() const
+  {
+    return size_;
+  }
+
+  /// size() rounded up to kLaneMultiple; valid after pad().
+  int paddedSize() const;
+
+  const Eigen::Vector3d& origin() const
+  {
+    return origin_;
+  }
+
+  double* channel(Channel c)
+  {
+    return data_.get() + static_cast<std::ptrdiff_t>(c) * capacity_;
+  }
+  const double* channel(Channel c) const
+  {
+    return data_.get() + static_cast<std::ptrdiff_t>(c) * capacity_;
+  }
+
+  /// Sets the number of points, keeping those there; new ones are to be written through
+  /// channel() by the caller (the fast way to fill a batch).
+  void resize(int n);
+
+  /// World coordinates of point i.
+  Eigen::Vector3d point(int i) const;
+
+  /// Covariance of point i, world axes.
+  Eigen::Matrix3d covariance(int i) const;
+
+private:
+  struct Deleter {
+    void operator()(double* p) const;
+  };
+  std::unique_ptr<double[], Deleter> data_;
+  int size_ = 0;
+  int capacity_ = 0;
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
+};
+
+} // namespace holdfast

@@ -1,0 +1,57 @@
+/// \file What a fit returns.
+#pragma once
+
+#include <holdfast/patch/parameters.h>
+
+#include <cstdint>
+#include <string_view>
+
+namespace holdfast {
+
+/// The comment is the test itself.
+enum class FitStatus : std::uint8_t {
+  Converged, ///< last Newton step below the tolerance; patch valid
+  AxisNotObservable, ///< as Converged, but kappa_x and kappa_y (or the two moments
+                     ///< of a plane) are too close to tell the x axis: its
+                     ///< variance is huge or capped
+  CurvatureNotObservable, ///< as Converged, but |kappa| of a sphere or cylinder is
+                          ///< below three of its sigmas: the centre slides
+  IterationLimit, ///< max_iterations reached; patch is the best so far
+  TooFewPoints, ///< fewer valid points than surface parameters
+  Degenerate, ///< normal equations singular; see null_space
+  CurvatureOutOfRange, ///< |kappa| > max_curvature_per_m
+  CurvatureSignMismatch, ///< elliptic forced on opposite signs or hyperbolic on equal
+  OrientationSingular, ///< |r_xy| = pi: the chart has no finite covariance there
+  NonFinite ///< overflow: coordinates or covariances beyond all reason
+};
+
+/// "converged", "axis_not_observable", ... as in the program's JSON.
+std::string_view statusName(FitStatus status);
+
+/// True for the statuses that come with a patch and a finite covariance.
+bool isUsable(FitStatus status);
+
+/// Undetermined directions in the solver's parameters (holdfast/fit/kernel.h), one unit
+/// column each; rows are padded to six.
+using NullSpace = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::DontAlign, 6, 6>;
+
+struct FitResult {
+  FitStatus status = FitStatus::TooFewPoints;
+  /// Meaningful when isUsable(status), and the best so far at IterationLimit.
+  Patch patch;
+  /// Covariance of [d | k | r | c] (holdfast/patch/parameters.h); 0 x 0 when not
+  /// usable.
+  ParameterMatrix covariance;
+  /// Sum of squared residuals over the point covariances, and its degrees of freedom
+  /// (points minus surface parameters).
+  double chi2 = 0.0;
+  int chi2_dof = 0;
+  int points = 0; ///< points used
+  int invalid_points = 0; ///< points left out: not finite or indefinite covariance
+  int iterations = 0; ///< damped Gauss-Newton steps tried
+  int polish_steps = 0; ///< exact Newton steps at the end
+  /// Directions the data do not determine; no column unless Degenerate.
+  NullSpace null_space = NullSpace(6, 0);
+};
+
+} // namespace holdfast

@@ -1,0 +1,50 @@
+/// \file Fitted patches to and from files.
+#pragma once
+
+#include <holdfast/pcl/patch_extraction.h>
+
+#include <array>
+#include <cstdint>
+#include <ostream>
+#include <string>
+#include <vector>
+
+namespace holdfast {
+
+/// Everything a result file says about one cloud.
+struct PatchReport {
+  std::string cloud; ///< file the patches come from
+  Sensor sensor; ///< as matched to the cloud
+  Pose sensor_pose;
+  ExtractionOptions options;
+  bool whole = false; ///< one patch to all points: the sampler options do not apply
+  ExtractionResult result;
+  double load_ms = 0.0;
+  double fit_ms = 0.0;
+};
+
+enum class JsonLayout : std::uint8_t {
+  OneLine, ///< so that the objects of several clouds make JSON Lines
+  PatchPerLine
+};
+
+/// Writes the report as one JSON object and a newline. Numbers survive the way to text
+/// and back bit for bit; those that are not finite become null.
+void writeJson(std::ostream& out, const PatchReport& report, JsonLayout layout);
+
+/// Reads the cloud's name, the patches and the rejected counts of a JSON object written
+/// by writeJson(); the other members of the report keep their defaults.
+/// \throw std::runtime_error when the text is no such object.
+PatchReport readJson(const std::string& text);
+
+/// Writes the patches as one triangle mesh (PLY: vertices x y z in metres, red green
+/// blue by surface type, in the frame of the cloud), each with edges of about an eighth
+/// of its length.
+void writeMesh(std::ostream& out,
+               const std::vector<ExtractedPatch>& patches,
+               bool ascii);
+
+/// Colour of a surface type in meshes, red green blue.
+std::array<std::uint8_t, 3> surfaceColor(SurfaceType surface);
+
+} // namespace holdfast

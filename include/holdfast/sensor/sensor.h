@@ -1,0 +1,26 @@
+/// \file A depth sensor: its camera and the noise of its measurements.
+#pragma once
+
+#include <holdfast/sensor/camera.h>
+#include <holdfast/sensor/noise_model.h>
+
+#include <string>
+
+namespace holdfast {
+
+struct Sensor {
+  std::string name;
+  Camera camera;
+  NoiseModel::ConstPtr noise; ///< never null in a loaded sensor
+  /// Depth range the sensor delivers, m.
+  double min_range_m = 0.0;
+  double max_range_m = 1e3;
+  /// Step of the disparity the sensor quantises to, px; 0: not quantised.
+  double disparity_quantum_px = 0.0;
+  /// Stereo geometry behind the disparity, needed for quantisation: baseline in metres
+  /// and focal length in px of the disparity image.
+  double baseline_m = 0.075;
+  double disparity_focal_px = 580.0;
+};
+
+} // namespace holdfast

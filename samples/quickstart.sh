@@ -1,0 +1,36 @@
+#!/usr/bin/env bash
+# From a fresh clone to patches: installs what is missing, builds the libraries and the
+# program, fits patches to the sample cloud.
+#
+#   samples/quickstart.sh [-o FOLDER]     results go to FOLDER (./holdfast-quickstart)
+set -euo pipefail
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+# shellcheck source=cmake/setup.sh
+source "$root/cmake/setup.sh"
+
+usage() {
+  sed -n '2,/^set/{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}"
+}
+
+results=$PWD/holdfast-quickstart
+while getopts "ho:" option; do
+  case $option in
+  o) results=$OPTARG ;;
+  h) usage && exit 0 ;;
+  *) usage >&2 && exit 2 ;;
+  esac
+done
+shift $((OPTIND - 1))
+(($# == 0)) || { usage >&2 && exit 2; }
+
+install_packages build
+build_in "$root/build" -DCMAKE_BUILD_TYPE=Release -DHOLDFAST_BUILD_TESTS=OFF \
+  -DHOLDFAST_BUILD_BENCHMARKS=OFF -DHOLDFAST_BUILD_SAMPLES=OFF
+
+echo
+"$root/build/bin/holdfast" fit "$root/samples/rocks.pcd" -o "$results"
+echo
+echo "Results are in $results:"
+ls "$results"
+echo "The program is $root/build/bin/holdfast; try it with --help."

@@ -1,0 +1,605 @@
+#include <holdfast/fit/boundary_fit.h>
+#include <holdfast/geometry/rotation.h>
+
+#include <Eigen/Geometry>
+
+#include <boost/math/special_functions/erf.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace holdfast {
+namespace {
+
+using kernel::Model;
+using Row = Eigen::Matrix<double, 1, JointLayout::kSize>;
+using Rows2 = Eigen::Matrix<double, 2, JointLayout::kSize, Eigen::RowMajor>;
+using Rows3 = Eigen::Matrix<double, 3, JointLayout::kSize, Eigen::RowMajor>;
+
+// Differences of curvatures or moments this much smaller than the values themselves are
+// taken as this large: the axis is arbitrary then, and its variance huge but finite.
+constexpr double kSmallestRelativeGap = 1e-6;
+
+double
+safeGap(double gap, double scale)
+{
+  const double smallest = std::max(kSmallestRelativeGap * scale, 1e-300);
+  return std::abs(gap) < smallest ? std::copysign(smallest, gap) : gap;
+}
+
+// A local frame, the moments of the points in it, and how both move with the joint
+// variables. Rows are in the axes of R; gamma = R^T dc.
+struct MomentFrame {
+  Eigen::Matrix3d R;
+  Eigen::Vector3d c; // relative to the batch's origin
+  Eigen::Vector3d mean; // of the points, R^T (qbar - c)
+  Eigen::Matrix3d M; // scatter about the mean, R^T C R
+  Rows3 delta, gamma, dmean;
+  Row dxx, dxy, dyy; // of M
+};
+
+// A frame before its moments are looked at: columns of the joint are in the axes of the
+// surface's R, rows of delta and gamma in those of the final frame.
+struct Placement {
+  Eigen::Matrix3d R;
+  Eigen::Vector3d c;
+  Rows3 delta = Rows3::Zero(), gamma = Rows3::Zero();
+};
+
+// Moments in a placed frame. W: from the axes of the surface to those of the frame.
+MomentFrame
+measureMoments(const Placement& placement,
+               const Scatter& scatter,
+               const Eigen::Matrix3d& W)
+{
+  MomentFrame f;
+  f.R = placement.R;
+  f.c = placement.c;
+  f.delta = placement.delta;
+  f.gamma = placement.gamma;
+  f.mean = f.R.transpose() * (scatter.mean - f.c);
+  f.M = f.R.transpose() * scatter.covariance * f.R;
+
+  f.dmean = skew(f.mean) * f.delta - f.gamma;
+  f.dmean.middleCols<3>(JointLayout::kMean) += W;
+
+  // d(R^T C R) = R^T dC R + M [delta]x - [delta]x M.
+  const Eigen::Matrix3d& M = f.M;
+  const auto dx = f.delta.row(0), dy = f.delta.row(1), dz = f.delta.row(2);
+  f.dxx = 2.0 * (M(0, 1) * dz - M(0, 2) * dy);
+  f.dyy = 2.0 * (M(1, 2) * dx - M(0, 1) * dz);
+  f.dxy = M(0, 2) * dx - M(1, 2) * dy + (M(1, 1) - M(0, 0)) * dz;
+  constexpr int kRow[6] = {0, 0, 0, 1, 1, 2}, kColumn[6] = {0, 1, 2, 1, 2, 2};
+  for (int e = 0; e < 6; ++e) {
+    const int i = kRow[e], j = kColumn[e], column = JointLayout::kScatter + e;
+    const double twice = i == j ? 1.0 : 2.0;
+    f.dxx[column] += twice * W(0, i) * W(0, j);
+    f.dyy[column] += twice * W(1, i) * W(1, j);
+    f.dxy[column] += W(0, i) * W(1, j) + (i == j ? 0.0 : W(0, j) * W(1, i));
+  }
+  return f;
+}
+
+// Moves the centre to R (mean_x, mean_y or 0, 0) + c: eq. of c' in II-6 and II-9.
+void
+recentre(MomentFrame& f, bool along_y)
+{
+  const Eigen::Vector3d shift(f.mean.x(), along_y ? f.mean.y() : 0.0, 0.0);
+  f.c += f.R * shift;
+  f.gamma -= skew(shift) * f.delta;
+  const int rows = along_y ? 2 : 1;
+  f.gamma.topRows(rows) += f.dmean.topRows(rows);
+  f.dmean.topRows(rows).setZero();
+  f.mean -= shift;
+}
+
+// The frame turned about z to x' = cos x + sin y.
+Eigen::Matrix3d
+turnedAboutZ(const Eigen::Matrix3d& R, double cosine, double sine)
+{
+  Eigen::Matrix3d turned = R;
+  turned.col(0) = cosine * R.col(0) + sine * R.col(1);
+  turned.col(1) = cosine * R.col(1) - sine * R.col(0);
+  return turned;
+}
+
+// x axis with non-negative world x component (ties: y, then z).
+Eigen::Matrix3d
+canonicalAxes(const Eigen::Matrix3d& R)
+{
+  constexpr double kTie = 1e-12;
+  const Eigen::Vector3d x = R.col(0);
+  const double decisive = std::abs(x[0]) > kTie ? x[0] :
+                          std::abs(x[1]) > kTie ? x[1] :
+                                                  x[2];
+  return decisive < 0.0 ? turnedAboutZ(R, -1.0, 0.0) : R;
+}
+
+// The normal that sphere and cylinder take over, in the axes of the surface.
+struct NormalMap {
+  Eigen::Vector3d n;
+  Rows3 dn = Rows3::Zero();
+};
+
+NormalMap
+normalMap(const UnboundedSurface& surface,
+          const Scatter& scatter,
+          const UnboundedSurface* plane)
+{
+  NormalMap map;
+  if (plane) {
+    const Eigen::Matrix3d turn = surface.R.transpose() * plane->R;
+    map.n = turn.col(2);
+    map.dn.col(JointLayout::kPlane) = -turn.col(1);
+    map.dn.col(JointLayout::kPlane + 1) = turn.col(0);
+    return map;
+  }
+  map.n = surface.R.transpose() * scatter.normal();
+  const Eigen::Matrix3d C = surface.R.transpose() * scatter.covariance * surface.R;
+  map.dn.middleCols<6>(JointLayout::kScatter) = normalJacobian(C, map.n);
+  return map;
+}
+
+// delta and gamma of the paraboloid's frame, I-2: c = mean + a n.
+Placement
+placeParaboloid(const UnboundedSurface& surface, const Scatter& scatter)
+{
+  const NormalMap normal = normalMap(surface, scatter, nullptr);
+  Placement p{surface.R, surface.c};
+  p.delta(0, 3) = p.delta(1, 4) = 1.0;
+  p.gamma.middleCols<3>(JointLayout::kMean).setIdentity();
+  p.gamma += surface.a * normal.dn;
+  p.gamma.col(5) += normal.n;
+  return p;
+}
+
+Placement
+placePlane(const UnboundedSurface& surface)
+{
+  Placement p{surface.R, surface.c};
+  p.delta(0, 0) = p.delta(1, 1) = 1.0;
+  p.gamma(2, 2) = 1.0;
+  return p;
+}
+
+// I-2 (ii), s = sphere: apex c = centre - n/k, centre = c_fit + z/k
+// (paper eq. (4) with the missing terms dc = dC + n dk/k^2 - dn/k).
+Placement
+placeSphere(const UnboundedSurface& surface, const NormalMap& normal)
+{
+  const double k = safeGap(surface.k[0], 1.0);
+  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
+  Placement p{surface.R, surface.c + surface.R * (z - normal.n) / k};
+  p.gamma = normal.dn / -k;
+  p.gamma.middleCols<3>(1) += Eigen::Matrix3d::Identity();
+  p.gamma.col(0) += (normal.n - z) / (k * k);
+  // In the surface's axes: the rotation that moves n, about axes normal to it.
+  p.delta = skew(normal.n) * normal.dn;
+  return p;
+}
+
+// I-2 (ii), s = circular cylinder: z' = normalise(n - x x^T n) (paper eq. (5): [x y z]
+// is a rotation only with z normal to x), apex on the axis' near side. \return false
+// when n is along the axis.
+bool
+placeCylinder(const UnboundedSurface& surface, const NormalMap& normal, Placement& p)
+{
+  constexpr double kSmallestSine = 1e-3;
+  const double k = safeGap(surface.k[0], 1.0);
+  const double across = std::hypot(normal.n.y(), normal.n.z());
+  if (across < kSmallestSine)
+    return false;
+  const Eigen::Vector3d x = Eigen::Vector3d::UnitX(), z = Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d up(0.0, normal.n.y() / across, normal.n.z() / across);
+  Rows3 tilt = Rows3::Zero(); // delta of the fit
+  tilt(1, 1) = tilt(2, 2) = 1.0;
+  const Rows3 dn = normal.dn + skew(normal.n) * tilt; // n seen from the moving frame
+  const Row roll = (up.y() * dn.row(2) - up.z() * dn.row(1)) / across; // about x
+  p.R = surface.R;
+  p.R.col(2) = surface.R * up;
+  p.R.col(1) = p.R.col(2).cross(p.R.col(0));
+  p.c = surface.c + surface.R * (z - up) / k;
+  p.delta = tilt;
+  p.delta.row(0) += roll;
+  p.gamma = (skew(z - up) * tilt / -k).eval();
+  p.gamma -= x.cross(up) * roll / k;
+  p.gamma(1, 3) += 1.0;
+  p.gamma(2, 4) += 1.0;
+  p.gamma.col(0) += (up - z) / (k * k);
+  return true;
+}
+
+// Brings rows from the axes of the surface into those of the frame R.
+void
+turnRows(const Eigen::Matrix3d& W, Placement& p)
+{
+  p.delta = (W * p.delta).eval();
+  p.gamma = (W * p.gamma).eval();
+}
+
+// The frame of a revolute type, R = Exp([rx ry 0]) with the same z; its twist about z
+// follows from r_z = 0. \return false where the chart is singular.
+bool
+orientRevolute(const Eigen::Vector2d& r_xy, Placement& p, Rows2& dr)
+{
+  Eigen::Matrix2d J;
+  if (!rxyJacobian(r_xy, J))
+    return false;
+  dr = J * p.delta.topRows<2>();
+  const Eigen::Matrix3d Jr = rightJacobian({r_xy.x(), r_xy.y(), 0.0});
+  p.delta.row(2) = Jr.block<1, 2>(2, 0) * dr;
+  return true;
+}
+
+// The curvature matrix in the axes of the final frame, with its rows.
+struct CurvatureMap {
+  double xx, xy, yy;
+  Row dxx = Row::Zero(), dxy = Row::Zero(), dyy = Row::Zero();
+};
+
+CurvatureMap
+curvatureMap(const Eigen::Vector3d& k, const Eigen::Matrix3d& W)
+{
+  CurvatureMap map;
+  Eigen::Matrix3d T; // (xx, xy, yy) in the new axes from the old
+  const double a = W(0, 0), b = W(0, 1), c = W(1, 0), d = W(1, 1);
+  T << a * a, 2.0 * a * b, b * b, a * c, a * d + b * c, b * d, c * c, 2.0 * c * d,
+      d * d;
+  const Eigen::Vector3d turned = T * k;
+  map.xx = turned[0], map.xy = turned[1], map.yy = turned[2];
+  map.dxx.head<3>() = T.row(0);
+  map.dxy.head<3>() = T.row(1);
+  map.dyy.head<3>() = T.row(2);
+  return map;
+}
+
+// Principal axes of the curvatures, |kappa_x| <= |kappa_y|, canonical x axis.
+Eigen::Matrix3d
+principalCurvatureAxes(const UnboundedSurface& surface)
+{
+  const Eigen::Vector3d& k = surface.k;
+  const double angle = 0.5 * std::atan2(2.0 * k[1], k[0] - k[2]);
+  const double mean = 0.5 * (k[0] + k[2]);
+  Eigen::Matrix3d R = turnedAboutZ(surface.R, std::cos(angle), std::sin(angle));
+  // The angle leads to the algebraically larger curvature, which has the larger
+  // magnitude when the mean is positive.
+  if (mean > 0.0)
+    R = turnedAboutZ(R, 0.0, 1.0);
+  return canonicalAxes(R);
+}
+
+// Fills a bounded patch: value and Jacobian rows group by group.
+class PatchWriter {
+public:
+  PatchWriter(PatchType type, BoundedPatch& out) : out_(out), layout_(layoutOf(type))
+  {
+    out.patch.type = type;
+    out.jacobian.setZero(layout_.size(), JointLayout::kSize);
+  }
+
+  void bound(int i, double value, const Row& row)
+  {
+    if (!(value > 0.0) || !std::isfinite(value))
+      out_.status = FitStatus::Degenerate;
+    out_.patch.d[i] = value;
+    out_.jacobian.row(i) = row;
+  }
+
+  // d = factor sqrt(moment).
+  void boundFromMoment(int i, double factor, double moment, const Row& dmoment)
+  {
+    const double d = factor * std::sqrt(std::max(moment, 0.0));
+    bound(i,
+          d,
+          d > 0.0 ? Row(factor * factor / (2.0 * d) * dmoment) : Row(Row::Zero()));
+  }
+
+  void curvature(int i, double value, const Row& row)
+  {
+    out_.patch.kappa[i] = value;
+    out_.jacobian.row(layout_.k() + i) = row;
+  }
+
+  void pose(const MomentFrame& f, const Eigen::Vector3d& origin)
+  {
+    out_.patch.r = logMap(f.R);
+    out_.jacobian.middleRows<3>(layout_.r()) =
+        rightJacobianInverse(out_.patch.r) * f.delta;
+    centre(f, origin);
+  }
+
+  void revolutePose(const MomentFrame& f,
+                    const Eigen::Vector2d& r_xy,
+                    const Rows2& dr,
+                    const Eigen::Vector3d& origin)
+  {
+    out_.patch.r << r_xy, 0.0;
+    out_.jacobian.middleRows<2>(layout_.r()) = dr;
+    centre(f, origin);
+  }
+
+private:
+  void centre(const MomentFrame& f, const Eigen::Vector3d& origin)
+  {
+    out_.patch.c = origin + f.c;
+    out_.jacobian.middleRows<3>(layout_.c()) = f.R * f.gamma;
+  }
+
+  BoundedPatch& out_;
+  ParameterLayout layout_;
+};
+
+// Second moments about the centre, v_x and v_y of eq. (10) with its missing 1/N.
+struct SecondMoments {
+  double x, y;
+  Row dx, dy;
+};
+
+SecondMoments
+secondMoments(const MomentFrame& f)
+{
+  return {f.M(0, 0) + f.mean.x() * f.mean.x(),
+          f.M(1, 1) + f.mean.y() * f.mean.y(),
+          f.dxx + 2.0 * f.mean.x() * f.dmean.row(0),
+          f.dyy + 2.0 * f.mean.y() * f.dmean.row(1)};
+}
+
+// II-7 and II-9, circle: radius from the mean of the moments, or the paper's max.
+void
+writeCircle(PatchWriter& writer,
+            double x,
+            double y,
+            const Row& dx,
+            const Row& dy,
+            double factor,
+            bool smooth)
+{
+  if (smooth)
+    writer.boundFromMoment(0, factor, 0.5 * (x + y), 0.5 * (dx + dy));
+  else
+    writer.boundFromMoment(0, factor, std::max(x, y), x > y ? dx : dy);
+}
+
+// II-8.
+BoundedPatch
+boundTwoCurvatures(PatchType type,
+                   const UnboundedSurface& surface,
+                   const Scatter& scatter,
+                   const Eigen::Vector3d& origin,
+                   double lambda)
+{
+  BoundedPatch out;
+  PatchWriter writer(type, out);
+  Placement p = placeParaboloid(surface, scatter);
+  p.R = principalCurvatureAxes(surface);
+  const Eigen::Matrix3d W = p.R.transpose() * surface.R;
+  turnRows(W, p);
+  const CurvatureMap K = curvatureMap(surface.k, W);
+  const double scale = std::max(std::abs(K.xx), std::abs(K.yy));
+  p.delta.row(2) = K.dxy / safeGap(K.xx - K.yy, scale);
+  MomentFrame f = measureMoments(p, scatter, W);
+  if (type.surface == SurfaceType::CylindricParaboloid) { // II-6
+    recentre(f, false);
+    writer.curvature(0, K.yy, K.dyy);
+  }
+  else {
+    writer.curvature(0, K.xx, K.dxx);
+    writer.curvature(1, K.yy, K.dyy);
+    const bool opposite = K.xx * K.yy < 0.0;
+    if (opposite != (type.surface == SurfaceType::HyperbolicParaboloid))
+      out.status = FitStatus::CurvatureSignMismatch;
+  }
+  const SecondMoments v = secondMoments(f);
+  writer.boundFromMoment(0, lambda, v.x, v.dx);
+  writer.boundFromMoment(1, lambda, v.y, v.dy);
+  writer.pose(f, origin);
+  return out;
+}
+
+// II-7.
+BoundedPatch
+boundRevolute(PatchType type,
+              const UnboundedSurface& surface,
+              const Scatter& scatter,
+              const UnboundedSurface* plane,
+              const Eigen::Vector3d& origin,
+              double lambda,
+              bool smooth)
+{
+  BoundedPatch out;
+  PatchWriter writer(type, out);
+  const bool sphere = type.surface == SurfaceType::Sphere;
+  const NormalMap normal = normalMap(surface, scatter, plane);
+  Placement p =
+      sphere ? placeSphere(surface, normal) : placeParaboloid(surface, scatter);
+  const Eigen::Vector3d z = sphere ? Eigen::Vector3d(surface.R * normal.n) :
+                                     Eigen::Vector3d(surface.R.col(2));
+  const Eigen::Vector2d r_xy = rxyFromNormal(z);
+  p.R = expMap({r_xy.x(), r_xy.y(), 0.0});
+  const Eigen::Matrix3d W = p.R.transpose() * surface.R;
+  turnRows(W, p);
+  Rows2 dr;
+  if (!orientRevolute(r_xy, p, dr)) {
+    out.status = FitStatus::OrientationSingular;
+    dr.setZero();
+  }
+  const MomentFrame f = measureMoments(p, scatter, W);
+  Row dk = Row::Zero();
+  dk[0] = sphere ? 1.0 : 0.5;
+  dk[2] = sphere ? 0.0 : 0.5;
+  writer.curvature(0, dk[0] * surface.k[0] + dk[2] * surface.k[2], dk);
+  const SecondMoments v = secondMoments(f);
+  writeCircle(writer, v.x, v.y, v.dx, v.dy, lambda, smooth);
+  writer.revolutePose(f, r_xy, dr, origin);
+  return out;
+}
+
+// II-6 for the circular cylinder.
+BoundedPatch
+boundCylinder(PatchType type,
+              const UnboundedSurface& surface,
+              const Scatter& scatter,
+              const UnboundedSurface* plane,
+              const Eigen::Vector3d& origin,
+              double lambda)
+{
+  BoundedPatch out;
+  PatchWriter writer(type, out);
+  Placement p;
+  if (!placeCylinder(surface, normalMap(surface, scatter, plane), p)) {
+    out.status = FitStatus::Degenerate;
+    return out;
+  }
+  p.R = canonicalAxes(p.R);
+  const Eigen::Matrix3d W = p.R.transpose() * surface.R;
+  turnRows(W, p);
+  MomentFrame f = measureMoments(p, scatter, W);
+  recentre(f, false);
+  Row dk = Row::Zero();
+  dk[0] = 1.0;
+  writer.curvature(0, surface.k[0], dk);
+  const SecondMoments v = secondMoments(f);
+  writer.boundFromMoment(0, lambda, v.x, v.dx);
+  writer.boundFromMoment(1, lambda, v.y, v.dy);
+  writer.pose(f, origin);
+  return out;
+}
+
+Placement
+placePlaneOf(const UnboundedSurface& surface, const Scatter& scatter)
+{
+  return surface.model == Model::Plane ? placePlane(surface) :
+                                         placeParaboloid(surface, scatter);
+}
+
+// Principal axes of the in-plane scatter, t = atan2(beta, alpha - phi)/2 of II-9.
+Eigen::Matrix3d
+principalScatterAxes(const Eigen::Matrix3d& R, const Scatter& scatter)
+{
+  const Eigen::Matrix3d M = R.transpose() * scatter.covariance * R;
+  const double t = 0.5 * std::atan2(2.0 * M(0, 1), M(0, 0) - M(1, 1));
+  return canonicalAxes(turnedAboutZ(R, std::cos(t), std::sin(t)));
+}
+
+// II-9, circle.
+BoundedPatch
+boundPlaneCircle(PatchType type,
+                 const UnboundedSurface& surface,
+                 const Scatter& scatter,
+                 const Eigen::Vector3d& origin,
+                 double factor,
+                 bool smooth)
+{
+  BoundedPatch out;
+  PatchWriter writer(type, out);
+  Placement p = placePlaneOf(surface, scatter);
+  const Eigen::Vector2d r_xy = rxyFromNormal(surface.R.col(2));
+  // The larger moment is that of the principal axes; the sum is the same in any.
+  p.R = principalScatterAxes(surface.R, scatter);
+  const Eigen::Matrix3d W = p.R.transpose() * surface.R;
+  turnRows(W, p);
+  MomentFrame f = measureMoments(p, scatter, W);
+  recentre(f, true);
+  const double scale = std::sqrt(2.0); // l = sqrt(-ln(1-Gamma)) sqrt(2 x moment)
+  writeCircle(writer, f.M(0, 0), f.M(1, 1), f.dxx, f.dyy, scale * factor, smooth);
+
+  Placement revolute{expMap({r_xy.x(), r_xy.y(), 0.0}), f.c};
+  revolute.delta = revolute.R.transpose() * f.R * f.delta;
+  Rows2 dr;
+  if (!orientRevolute(r_xy, revolute, dr)) {
+    out.status = FitStatus::OrientationSingular;
+    dr.setZero();
+  }
+  writer.revolutePose(f, r_xy, dr, origin);
+  return out;
+}
+
+// II-9: ellipse, rectangle and convex quad from l+ and l-, paper eqs. (15) and (17).
+// In the principal axes alpha = M_xx, phi = M_yy, beta = 0, and l+-^2 = 2 (alpha, phi)
+// times -ln(1 - Gamma).
+BoundedPatch
+boundPlane(PatchType type,
+           const UnboundedSurface& surface,
+           const Scatter& scatter,
+           const Eigen::Vector3d& origin,
+           double factor)
+{
+  BoundedPatch out;
+  PatchWriter writer(type, out);
+  Placement p = placePlaneOf(surface, scatter);
+  p.R = principalScatterAxes(surface.R, scatter);
+  const Eigen::Matrix3d W = p.R.transpose() * surface.R;
+  turnRows(W, p);
+  MomentFrame f = measureMoments(p, scatter, W);
+  // dt = ((alpha - phi) dbeta - beta (dalpha - dphi)) / (2 D) at beta = 0.
+  const double gap = safeGap(f.M(0, 0) - f.M(1, 1), f.M(0, 0));
+  p.delta.row(2) += f.dxy / gap;
+  f = measureMoments(p, scatter, W);
+  recentre(f, true);
+  const double scale = std::sqrt(2.0) * factor;
+  if (type.boundary != BoundaryType::Quad) {
+    writer.boundFromMoment(0, scale, f.M(0, 0), f.dxx);
+    writer.boundFromMoment(1, scale, f.M(1, 1), f.dyy);
+  }
+  else {
+    // |l|^2 = scale^2 (alpha + phi), gamma = atan2(l-, l+).
+    const double alpha = std::max(f.M(0, 0), 0.0), phi = std::max(f.M(1, 1), 0.0);
+    for (int i = 0; i < 4; ++i)
+      writer.boundFromMoment(i, scale, alpha + phi, f.dxx + f.dyy);
+    const double sum = std::sqrt(alpha * phi) * (alpha + phi);
+    const Row dgamma =
+        sum > 0.0 ? Row((alpha * f.dyy - phi * f.dxx) / (2.0 * sum)) : Row(Row::Zero());
+    writer.bound(4, std::atan2(std::sqrt(phi), std::sqrt(alpha)), dgamma);
+  }
+  writer.pose(f, origin);
+  return out;
+}
+
+} // namespace
+
+ContainmentFactors
+ContainmentFactors::of(double containment)
+{
+  return {std::sqrt(2.0) * boost::math::erf_inv(containment),
+          std::sqrt(-std::log1p(-containment))};
+}
+
+BoundedPatch
+boundPatch(PatchType type,
+           const UnboundedSurface& surface,
+           const Scatter& scatter,
+           const UnboundedSurface* plane,
+           const Eigen::Vector3d& origin,
+           const ContainmentFactors& factors,
+           bool smooth_circle_radius)
+{
+  switch (type.surface) {
+  case SurfaceType::Plane:
+    if (type.boundary == BoundaryType::Circle)
+      return boundPlaneCircle(type,
+                              surface,
+                              scatter,
+                              origin,
+                              factors.plane,
+                              smooth_circle_radius);
+    return boundPlane(type, surface, scatter, origin, factors.plane);
+  case SurfaceType::Sphere:
+  case SurfaceType::CircularParaboloid:
+    return boundRevolute(type,
+                         surface,
+                         scatter,
+                         plane,
+                         origin,
+                         factors.lambda,
+                         smooth_circle_radius);
+  case SurfaceType::CircularCylinder:
+    return boundCylinder(type, surface, scatter, plane, origin, factors.lambda);
+  case SurfaceType::EllipticParaboloid:
+  case SurfaceType::HyperbolicParaboloid:
+  case SurfaceType::CylindricParaboloid:
+    break;
+  }
+  return boundTwoCurvatures(type, surface, scatter, origin, factors.lambda);
+}
+
+} // namespace holdfast

@@ -1,0 +1,165 @@
+#include <holdfast/fit/fit_patch.h>
+
+#include <cmath>
+#include <stdexcept>
+
+namespace holdfast {
+namespace {
+
+using kernel::Model;
+
+Model
+modelOf(SurfaceRequest request)
+{
+  switch (request) {
+  case SurfaceRequest::Plane:
+    return Model::Plane;
+  case SurfaceRequest::Sphere:
+    return Model::Sphere;
+  case SurfaceRequest::CircularCylinder:
+    return Model::Cylinder;
+  default:
+    return Model::Paraboloid;
+  }
+}
+
+bool
+hasExtent(const Scatter& scatter)
+{
+  // Finite, and at least one direction in which the points spread.
+  return scatter.covariance.allFinite() && scatter.eigenvalues[2] > 0.0;
+}
+
+bool
+curvatureInRange(const SurfaceFit& fit, double limit)
+{
+  const Eigen::Vector3d& k = fit.surface.k;
+  if (fit.surface.model != Model::Paraboloid)
+    return std::abs(k[0]) <= limit;
+  const double mean = 0.5 * (k[0] + k[2]);
+  return std::abs(mean) + std::hypot(0.5 * (k[0] - k[2]), k[1]) <= limit;
+}
+
+SurfaceType
+signedType(const Eigen::Vector3d& k)
+{
+  return k[0] * k[2] - k[1] * k[1] < 0.0 ? SurfaceType::HyperbolicParaboloid :
+                                           SurfaceType::EllipticParaboloid;
+}
+
+} // namespace
+
+PatchFitter::PatchFitter(const FitOptions& options) : options_(options)
+{
+  const std::string error = validityError(options);
+  if (!error.empty())
+    throw std::invalid_argument(error);
+  factors_ = ContainmentFactors::of(options.containment);
+  thresholds_ = DiscriminationThresholds::atLevel(options.discrimination_level);
+}
+
+PatchType
+PatchFitter::patchType(const PatchFit& fit) const
+{
+  const auto typed = [this](SurfaceType surface) {
+    return PatchType{surface,
+                     surface == SurfaceType::Plane && options_.plane_boundary ?
+                         *options_.plane_boundary :
+                         defaultBoundary(surface)};
+  };
+  const SurfaceFit& surface = fit.surface;
+  switch (options_.surface) {
+  case SurfaceRequest::Plane:
+    return typed(SurfaceType::Plane);
+  case SurfaceRequest::Sphere:
+    return typed(SurfaceType::Sphere);
+  case SurfaceRequest::CircularCylinder:
+    return typed(SurfaceType::CircularCylinder);
+  case SurfaceRequest::EllipticParaboloid:
+    return typed(SurfaceType::EllipticParaboloid);
+  case SurfaceRequest::HyperbolicParaboloid:
+    return typed(SurfaceType::HyperbolicParaboloid);
+  case SurfaceRequest::CylindricParaboloid:
+    return typed(SurfaceType::CylindricParaboloid);
+  case SurfaceRequest::CircularParaboloid:
+    return typed(SurfaceType::CircularParaboloid);
+  case SurfaceRequest::Paraboloid:
+    return typed(signedType(surface.surface.k));
+  case SurfaceRequest::Auto:
+    break;
+  }
+  const ThetaMatrix covariance =
+      thetaCovariance(surface.linearization, surface.linearization.H);
+  return typed(discriminate(surface.surface.k,
+                            covariance.topLeftCorner<3, 3>(),
+                            thresholds_,
+                            options_));
+}
+
+BoundedPatch
+PatchFitter::bound(PatchType type,
+                   const UnboundedSurface& surface,
+                   const Scatter& scatter,
+                   const UnboundedSurface* plane,
+                   const Eigen::Vector3d& origin) const
+{
+  return boundPatch(type,
+                    surface,
+                    scatter,
+                    plane,
+                    origin,
+                    factors_,
+                    options_.smooth_circle_radius);
+}
+
+PatchFit
+PatchFitter::fit(PointBatch& batch) const
+{
+  PatchFit fit;
+  fit.invalid_points = batch.removeInvalid();
+  fit.points = batch.size();
+  const Model model = modelOf(options_.surface);
+  if (fit.points < kernel::parameterCount(model))
+    return fit;
+  batch.applyFloor(options_.sigma_floor_m);
+  batch.pad();
+
+  // Stage I-1 (i): principal axes.
+  fit.scatter = measureScatter(batch,
+                               options_.debias_scatter,
+                               options_.viewpoint - batch.origin());
+  if (!hasExtent(fit.scatter)) {
+    fit.status = fit.scatter.covariance.allFinite() ? FitStatus::Degenerate :
+                                                      FitStatus::NonFinite;
+    return fit;
+  }
+  // Stage I-1 (i), s != parab: the paper's weighted plane.
+  fit.has_plane_stage =
+      !options_.normal_from_pca && (model == Model::Sphere || model == Model::Cylinder);
+  if (fit.has_plane_stage) {
+    fit.plane = fitSurface(Model::Plane, batch, fit.scatter, options_, fit.null_space);
+    fit.status = fit.plane.status;
+    if (fit.status != FitStatus::Converged)
+      return fit;
+  }
+  // Stage I-2 (for planes: I-1's refit).
+  fit.surface = fitSurface(model, batch, fit.scatter, options_, fit.null_space);
+  fit.status = fit.surface.status;
+  if (fit.status != FitStatus::Converged && fit.status != FitStatus::IterationLimit)
+    return fit;
+  if (!curvatureInRange(fit.surface, options_.max_curvature_per_m)) {
+    fit.status = FitStatus::CurvatureOutOfRange;
+    return fit;
+  }
+  // Stage I-3, then II-4 to II-9.
+  fit.bounded = bound(patchType(fit),
+                      fit.surface.surface,
+                      fit.scatter,
+                      fit.normalPlane(),
+                      batch.origin());
+  if (fit.status == FitStatus::Converged)
+    fit.status = fit.bounded.status;
+  return fit;
+}
+
+} // namespace holdfast

@@ -1,0 +1,104 @@
+#include <holdfast/fit/kernel.h>
+
+#include <cmath>
+
+#define HOLDFAST_INLINE inline
+#define HOLDFAST_UNROLL
+
+namespace holdfast { namespace kernel {
+namespace {
+
+using Number = double;
+constexpr int kLanes = 1;
+
+double
+load(const double* p)
+{
+  return *p;
+}
+
+double
+sumOfLanes(double x)
+{
+  return x;
+}
+
+double
+squareRoot(double x)
+{
+  return std::sqrt(x);
+}
+
+double
+selectLess(double a, double b, double x, double y)
+{
+  return a < b ? x : y;
+}
+
+#include "kernel_point.inl"
+
+struct CrossTermAction {
+  const Points& points;
+  const State& state;
+  std::vector<double>& X;
+
+  template <typename Surface, typename ResidualPolicy>
+  void run() const
+  {
+    X.resize(static_cast<std::size_t>(points.padded_size) * 3 *
+             ParameterDerivatives<Surface>::kCount);
+    crossTermsOfPoints<Surface, ResidualPolicy>(points, state, X.data());
+  }
+};
+
+} // namespace
+
+void
+crossTerms(Model model,
+           Residual residual,
+           const Points& points,
+           const State& state,
+           std::vector<double>& X)
+{
+  forSurfaceAndResidual(model, residual, CrossTermAction{points, state, X});
+}
+
+namespace reference {
+
+void
+accumulateScatter(const Points& points, ScatterSums& sums)
+{
+  scatterSums(points, sums);
+}
+
+void
+accumulateQuadric(const Points& points,
+                  const double R[9],
+                  const double c[3],
+                  QuadricSums& sums)
+{
+  quadricSums(points, R, c, sums);
+}
+
+void
+accumulateNormal(Model model,
+                 Residual residual,
+                 const Points& points,
+                 const State& state,
+                 NormalSums& sums)
+{
+  normalSums(model, residual, points, state, sums);
+}
+
+void
+accumulateCovariance(Model model,
+                     Residual residual,
+                     const Points& points,
+                     const State& state,
+                     CovarianceSums& sums)
+{
+  covarianceSums(model, residual, points, state, sums);
+}
+
+} // namespace reference
+}} // namespace holdfast::kernel

@@ -1,0 +1,161 @@
+#include <holdfast/fit/point_batch.h>
+#include <holdfast/geometry/gaussian.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <new>
+
+namespace holdfast {
+namespace {
+
+// One cache line: the widest vectors, and a multiple of kLaneMultiple doubles.
+constexpr std::size_t kAlignment = 64;
+
+int
+roundedUp(int n)
+{
+  return (n + PointBatch::kLaneMultiple - 1) / PointBatch::kLaneMultiple *
+         PointBatch::kLaneMultiple;
+}
+
+} // namespace
+
+void
+PointBatch::Deleter::operator()(double* p) const
+{
+  std::free(p);
+}
+
+void
+PointBatch::clear(const Eigen::Vector3d& origin)
+{
+  size_ = 0;
+  origin_ = origin;
+}
+
+void
+PointBatch::reserve(int n)
+{
+  if (n <= capacity_)
+    return;
+  const int capacity = roundedUp(n);
+  const std::size_t bytes =
+      sizeof(double) * kChannels * static_cast<std::size_t>(capacity);
+  std::unique_ptr<double[], Deleter> data(
+      static_cast<double*>(std::aligned_alloc(kAlignment, bytes)));
+  if (!data)
+    throw std::bad_alloc();
+  for (int c = 0; c < kChannels; ++c)
+    std::copy_n(data_.get() + static_cast<std::ptrdiff_t>(c) * capacity_,
+                size_,
+                data.get() + static_cast<std::ptrdiff_t>(c) * capacity);
+  data_ = std::move(data);
+  capacity_ = capacity;
+}
+
+void
+PointBatch::resize(int n)
+{
+  if (n > capacity_)
+    reserve(std::max(n, 2 * capacity_));
+  if (n > size_)
+    std::fill(channel(W) + size_, channel(W) + n, 1.0);
+  size_ = n;
+}
+
+void
+PointBatch::add(const Eigen::Vector3d& point, const Eigen::Matrix3d& covariance)
+{
+  const int i = size_;
+  resize(i + 1);
+  for (int k = 0; k < 3; ++k)
+    channel(static_cast<Channel>(X + k))[i] = point[k] - origin_[k];
+  channel(SXX)[i] = covariance(0, 0);
+  channel(SXY)[i] = covariance(0, 1);
+  channel(SXZ)[i] = covariance(0, 2);
+  channel(SYY)[i] = covariance(1, 1);
+  channel(SYZ)[i] = covariance(1, 2);
+  channel(SZZ)[i] = covariance(2, 2);
+}
+
+namespace {
+
+// Cheap test that accepts almost every sound covariance: leading minors of a positive
+// definite matrix. What it does not accept is looked at properly.
+bool
+surelyPositiveDefinite(const Eigen::Matrix3d& S)
+{
+  const double minor = S(0, 0) * S(1, 1) - S(0, 1) * S(0, 1);
+  return S(0, 0) > 0.0 && minor > 0.0 && S.determinant() > 0.0 && S.allFinite();
+}
+
+} // namespace
+
+int
+PointBatch::removeInvalid()
+{
+  int kept = 0;
+  for (int i = 0; i < size_; ++i) {
+    const Eigen::Matrix3d S = covariance(i);
+    const double sum = channel(X)[i] + channel(Y)[i] + channel(Z)[i];
+    if (!std::isfinite(sum) ||
+        !(surelyPositiveDefinite(S) || isPositiveSemiDefinite(S)))
+      continue;
+    if (kept != i)
+      for (int c = 0; c < kChannels; ++c)
+        channel(static_cast<Channel>(c))[kept] = channel(static_cast<Channel>(c))[i];
+    ++kept;
+  }
+  const int removed = size_ - kept;
+  size_ = kept;
+  return removed;
+}
+
+void
+PointBatch::applyFloor(double sigma_floor_m)
+{
+  const double floor = sigma_floor_m * sigma_floor_m;
+  for (int i = 0; i < size_; ++i)
+    if (channel(SXX)[i] + channel(SYY)[i] + channel(SZZ)[i] < floor) {
+      channel(SXX)[i] += floor;
+      channel(SYY)[i] += floor;
+      channel(SZZ)[i] += floor;
+    }
+}
+
+void
+PointBatch::pad()
+{
+  reserve(roundedUp(size_));
+  const int padded = paddedSize();
+  for (int c = 0; c < kChannels && size_ > 0; ++c) {
+    double* values = channel(static_cast<Channel>(c));
+    // Copies of a point stay within range of the surface; no covariance, no weight.
+    std::fill(values + size_, values + padded, c < SXX ? values[size_ - 1] : 0.0);
+  }
+}
+
+int
+PointBatch::paddedSize() const
+{
+  return roundedUp(size_);
+}
+
+Eigen::Vector3d
+PointBatch::point(int i) const
+{
+  return origin_ + Eigen::Vector3d(channel(X)[i], channel(Y)[i], channel(Z)[i]);
+}
+
+Eigen::Matrix3d
+PointBatch::covariance(int i) const
+{
+  Eigen::Matrix3d S;
+  S << channel(SXX)[i], channel(SXY)[i], channel(SXZ)[i], channel(SXY)[i],
+      channel(SYY)[i], channel(SYZ)[i], channel(SXZ)[i], channel(SYZ)[i],
+      channel(SZZ)[i];
+  return S;
+}
+
+} // namespace holdfast

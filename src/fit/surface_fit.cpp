@@ -1,0 +1,511 @@
+#include <holdfast/fit/levenberg_marquardt.h>
+#include <holdfast/fit/surface_fit.h>
+#include <holdfast/geometry/rotation.h>
+
+#include "fit/surface_start.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+
+#include <cmath>
+
+namespace holdfast {
+namespace {
+
+using kernel::Model;
+using Matrix36 = Eigen::Matrix<double, 3, 6>;
+
+// Pivots of the normal equations scaled to unit diagonal: the share of a parameter's
+// information that the others do not explain. Below 1e-10 it is rounding: the float
+// coordinates of a cloud carry 7 digits, and the pivot is of second order in them.
+constexpr double kSmallestPivot = 1e-10;
+
+// Exact Newton steps at the end; each squares the error, so more than a few mean
+// trouble.
+constexpr int kMaxPolishSteps = 12;
+
+// The gradient E_theta = L[f_theta] for the shape parameters, and E_c (local axes).
+void
+shapeGradient(const UnboundedSurface& surface, const double L[], Theta& gradient)
+{
+  using namespace kernel;
+  const Eigen::Vector3d& k = surface.k;
+  switch (surface.model) {
+  case Model::Paraboloid:
+    gradient[0] = L[PXX];
+    gradient[1] = 2.0 * L[PXY];
+    gradient[2] = L[PYY];
+    gradient[3] = 2.0 * (k[1] * L[PXZ] + k[2] * L[PYZ] + L[PY]);
+    gradient[4] = -2.0 * (k[0] * L[PXZ] + k[1] * L[PYZ] + L[PX]);
+    break;
+  case Model::Sphere:
+    gradient[0] = L[PXX] + L[PYY] + L[PZZ];
+    break;
+  case Model::Cylinder:
+    gradient[0] = L[PYY] + L[PZZ];
+    gradient[1] = 2.0 * (k[0] * L[PXZ] - L[PX]);
+    gradient[2] = -2.0 * k[0] * L[PXY];
+    break;
+  case Model::Plane:
+    gradient[0] = 2.0 * L[PY];
+    gradient[1] = -2.0 * L[PX];
+    break;
+  }
+}
+
+// E_c = L[-g], local axes.
+Eigen::Vector3d
+centreGradient(const UnboundedSurface& surface, const double L[])
+{
+  using namespace kernel;
+  const Eigen::Vector3d& k = surface.k;
+  const double up = 2.0 * L[P1];
+  switch (surface.model) {
+  case Model::Paraboloid:
+    return {-2.0 * (k[0] * L[PX] + k[1] * L[PY]),
+            -2.0 * (k[1] * L[PX] + k[2] * L[PY]),
+            up};
+  case Model::Sphere:
+    return {-2.0 * k[0] * L[PX], -2.0 * k[0] * L[PY], up - 2.0 * k[0] * L[PZ]};
+  case Model::Cylinder:
+    return {0.0, -2.0 * k[0] * L[PY], up - 2.0 * k[0] * L[PZ]};
+  case Model::Plane:
+    break;
+  }
+  return {0.0, 0.0, up};
+}
+
+// L[f_ab] for the shape parameters, upper triangle.
+void
+addCurvatureTerms(const UnboundedSurface& surface, const double L[], ThetaMatrix& H)
+{
+  using namespace kernel;
+  const Eigen::Vector3d& k = surface.k;
+  switch (surface.model) {
+  case Model::Paraboloid:
+    H(0, 4) -= 2.0 * L[PXZ];
+    H(1, 3) += 2.0 * L[PXZ];
+    H(1, 4) -= 2.0 * L[PYZ];
+    H(2, 3) += 2.0 * L[PYZ];
+    H(3, 3) += 2.0 * (k[2] * (L[PZZ] - L[PYY]) - k[1] * L[PXY] + L[PZ]);
+    H(4, 4) += 2.0 * (k[0] * (L[PZZ] - L[PXX]) - k[1] * L[PXY] + L[PZ]);
+    H(3, 4) += (k[0] + k[2]) * L[PXY] + k[1] * (L[PXX] + L[PYY] - 2.0 * L[PZZ]);
+    break;
+  case Model::Sphere:
+    break;
+  case Model::Cylinder:
+    H(0, 1) += 2.0 * L[PXZ];
+    H(0, 2) -= 2.0 * L[PXY];
+    H(1, 1) += 2.0 * (k[0] * (L[PXX] - L[PZZ]) + L[PZ]);
+    H(2, 2) += 2.0 * k[0] * (L[PXX] - L[PYY]);
+    H(1, 2) += 2.0 * k[0] * L[PYZ] - L[PY];
+    break;
+  case Model::Plane:
+    H(0, 0) += 2.0 * L[PZ];
+    H(1, 1) += 2.0 * L[PZ];
+    break;
+  }
+}
+
+// Directions of the translation parameters, local axes, one column each.
+Eigen::Matrix3d
+translationDirections(const UnboundedSurface& surface, const Eigen::Vector3d& line)
+{
+  Eigen::Matrix3d directions = Eigen::Matrix3d::Identity();
+  if (surface.model == Model::Paraboloid)
+    directions.col(0) = surface.R.transpose() * line;
+  else if (surface.model == Model::Cylinder)
+    directions << 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0;
+  else if (surface.model == Model::Plane)
+    directions.col(0) = Eigen::Vector3d::UnitZ();
+  return directions;
+}
+
+Theta
+fullGradient(const UnboundedSurface& surface, const Scatter& scatter, const double L[])
+{
+  Theta gradient = Theta::Zero();
+  shapeGradient(surface, L, gradient);
+  const int shape = kernel::shapeParameterCount(surface.model);
+  const int n = kernel::parameterCount(surface.model) - shape;
+  const Eigen::Vector3d E_c = centreGradient(surface, L);
+  const Eigen::Matrix3d directions = translationDirections(surface, scatter.normal());
+  for (int i = 0; i < n; ++i)
+    gradient[shape + i] = E_c.dot(directions.col(i));
+  return gradient;
+}
+
+// The surface moved by a step of theta.
+UnboundedSurface
+retracted(const UnboundedSurface& surface, const Scatter& scatter, const Theta& step)
+{
+  UnboundedSurface next = surface;
+  Eigen::Vector3d delta = Eigen::Vector3d::Zero(), shift = Eigen::Vector3d::Zero();
+  switch (surface.model) {
+  case Model::Paraboloid:
+    next.k += step.head<3>();
+    delta.head<2>() = step.segment<2>(3);
+    next.a += step[5];
+    break;
+  case Model::Sphere:
+    next.k[0] += step[0];
+    shift = step.segment<3>(1);
+    break;
+  case Model::Cylinder:
+    next.k[0] += step[0];
+    delta.tail<2>() = step.segment<2>(1);
+    shift.tail<2>() = step.segment<2>(3);
+    break;
+  case Model::Plane:
+    delta.head<2>() = step.head<2>();
+    shift.z() = step[2];
+    break;
+  }
+  next.R = surface.R * expMap(delta);
+  next.c = surface.model == Model::Paraboloid ?
+               Eigen::Vector3d(scatter.mean + next.a * scatter.normal()) :
+               Eigen::Vector3d(surface.c + surface.R * shift);
+  return next;
+}
+
+// The weighted least-squares problem of one surface, as levenbergMarquardt() wants it.
+struct SurfaceProblem {
+  using State = UnboundedSurface;
+  struct Evaluation {
+    double cost = 0.0;
+    Theta gradient = Theta::Zero();
+    ThetaMatrix JtJ = ThetaMatrix::Identity();
+  };
+
+  Model model;
+  Residual residual;
+  kernel::Points points;
+  const Scatter& scatter;
+
+  void evaluate(const State& state, Evaluation& evaluation) const
+  {
+    kernel::NormalSums sums;
+    kernel::accumulateNormal(model,
+                             residual,
+                             points,
+                             kernelState(state, scatter),
+                             sums);
+    evaluation.cost = sums.cost;
+    evaluation.gradient = fullGradient(state, scatter, sums.L);
+    evaluation.JtJ.setIdentity();
+    const int n = kernel::parameterCount(model);
+    for (int a = 0, entry = 0; a < n; ++a)
+      for (int b = a; b < n; ++b, ++entry)
+        evaluation.JtJ(a, b) = evaluation.JtJ(b, a) = sums.JtJ[entry];
+  }
+
+  State retract(const State& state, const Theta& step) const
+  {
+    return retracted(state, scatter, step);
+  }
+};
+
+// Scales to unit diagonal and returns the smallest Cholesky pivot; 0 when not positive.
+double
+smallestPivot(const ThetaMatrix& H)
+{
+  const Theta diagonal = H.diagonal();
+  if (!(diagonal.minCoeff() > 0.0) || !diagonal.allFinite())
+    return 0.0;
+  const Theta scale = diagonal.cwiseSqrt().cwiseInverse();
+  const ThetaMatrix scaled = scale.asDiagonal() * H * scale.asDiagonal();
+  const Eigen::LLT<ThetaMatrix> cholesky(scaled);
+  if (cholesky.info() != Eigen::Success)
+    return 0.0;
+  const double smallest = cholesky.matrixLLT().diagonal().minCoeff();
+  return smallest * smallest;
+}
+
+// Undetermined directions: eigenvectors of the scaled normal equations.
+NullSpace
+nullSpaceOf(const ThetaMatrix& H, int n)
+{
+  Theta scale = Theta::Ones();
+  for (int i = 0; i < n; ++i)
+    scale[i] = H(i, i) > 0.0 ? 1.0 / std::sqrt(H(i, i)) : 1.0;
+  const ThetaMatrix scaled = scale.asDiagonal() * H * scale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> solver(scaled);
+  NullSpace space(6, 0);
+  for (int i = 0; i < 6; ++i) {
+    if (solver.eigenvalues()[i] > kSmallestPivot)
+      break;
+    const Theta direction = scale.cwiseProduct(solver.eigenvectors().col(i));
+    space.conservativeResize(6, space.cols() + 1);
+    space.col(space.cols() - 1) = direction.normalized();
+  }
+  return space;
+}
+
+Eigen::Matrix<double, kernel::kMaxTheta, 3>
+crossSumMatrix(const kernel::CovarianceSums& sums, int n)
+{
+  Eigen::Matrix<double, kernel::kMaxTheta, 3> T;
+  T.setZero();
+  for (int a = 0; a < n; ++a)
+    for (int i = 0; i < 3; ++i)
+      T(a, i) = sums.X[a][i];
+  return T;
+}
+
+// Hessian: shape block from the sums; columns of translations along d are -sum X_i d,
+// since the cost depends on q - c alone.
+ThetaMatrix
+hessian(const UnboundedSurface& surface,
+        const kernel::CovarianceSums& sums,
+        const Eigen::Matrix3d& directions)
+{
+  const int shape = kernel::shapeParameterCount(surface.model);
+  const int n = kernel::parameterCount(surface.model);
+  ThetaMatrix H = ThetaMatrix::Identity();
+  for (int a = 0, entry = 0; a < shape; ++a)
+    for (int b = a; b < shape; ++b, ++entry)
+      H(a, b) = sums.H[entry];
+  addCurvatureTerms(surface, sums.L, H);
+  const auto T = crossSumMatrix(sums, n);
+  for (int i = shape; i < n; ++i)
+    H.col(i).head(n) = -T.topRows(n) * directions.col(i - shape);
+  for (int a = 0; a < n; ++a)
+    for (int b = a + 1; b < n; ++b)
+      H(b, a) = H(a, b);
+  return H;
+}
+
+// A = d^2E/dtheta ds. Only the paraboloid depends on the moments: c = mean + a n(C).
+ThetaByMoments
+momentCross(const UnboundedSurface& surface,
+            const Scatter& scatter,
+            const kernel::CovarianceSums& sums)
+{
+  ThetaByMoments A = ThetaByMoments::Zero();
+  if (surface.model != Model::Paraboloid)
+    return A;
+  const Eigen::Matrix3d C = surface.R.transpose() * scatter.covariance * surface.R;
+  const Matrix36 dn = normalJacobian(C, surface.R.transpose() * scatter.normal());
+  const auto T = crossSumMatrix(sums, kernel::kMaxTheta);
+  A.leftCols<3>() = -T;
+  A.rightCols<6>() = (-surface.a * T).lazyProduct(dn);
+  A.row(5).tail<6>() += centreGradient(surface, sums.L).transpose() * dn;
+  return A;
+}
+
+// Covariance of the moments. D_i: mean I/N, scatter bc (qt_b e_c + qt_c e_b)/N.
+MomentMatrix
+momentCovariance(const kernel::CovarianceSums& sums, int count)
+{
+  constexpr int kIndex[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+  constexpr int kRow[6] = {0, 0, 0, 1, 1, 2}, kColumn[6] = {0, 1, 2, 1, 2, 2};
+  const double scale = 1.0 / (static_cast<double>(count) * count);
+  MomentMatrix DD;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      DD(i, j) = sums.S[kIndex[i][j]] * scale;
+  for (int e = 0; e < 6; ++e) {
+    const int b = kRow[e], c = kColumn[e];
+    for (int i = 0; i < 3; ++i)
+      DD(i, 3 + e) = DD(3 + e, i) =
+          (sums.qS[b][kIndex[c][i]] + sums.qS[c][kIndex[b][i]]) * scale;
+    for (int o = e; o < 6; ++o) {
+      const int d = kRow[o], f = kColumn[o];
+      DD(3 + e, 3 + o) = DD(3 + o, 3 + e) =
+          (sums.qqS[kIndex[b][d]][kIndex[c][f]] + sums.qqS[kIndex[b][f]][kIndex[c][d]] +
+           sums.qqS[kIndex[c][d]][kIndex[b][f]] +
+           sums.qqS[kIndex[c][f]][kIndex[b][d]]) *
+          scale;
+    }
+  }
+  return DD;
+}
+
+Linearization
+linearize(const UnboundedSurface& surface,
+          const Scatter& scatter,
+          const kernel::CovarianceSums& sums)
+{
+  const int n = kernel::parameterCount(surface.model);
+  Linearization result;
+  result.H = hessian(surface, sums, translationDirections(surface, scatter.normal()));
+  result.A = momentCross(surface, scatter, sums);
+  const double inverse_count = 1.0 / scatter.count;
+  for (int a = 0, entry = 0; a < n; ++a) {
+    for (int b = a; b < n; ++b, ++entry)
+      result.XX(a, b) = result.XX(b, a) = sums.XX[entry];
+    for (int i = 0; i < 3; ++i)
+      result.XD(a, i) = sums.XS[a][i] * inverse_count;
+    for (int e = 0; e < 6; ++e)
+      result.XD(a, 3 + e) = sums.XSq[a][e] * inverse_count;
+  }
+  result.DD = momentCovariance(sums, scatter.count);
+  return result;
+}
+
+FitStatus
+statusOf(LevenbergMarquardtSummary::Stop stop)
+{
+  using Stop = LevenbergMarquardtSummary::Stop;
+  switch (stop) {
+  case Stop::Converged:
+    return FitStatus::Converged;
+  case Stop::IterationLimit:
+    return FitStatus::IterationLimit;
+  case Stop::Singular:
+    return FitStatus::Degenerate;
+  case Stop::NonFinite:
+    break;
+  }
+  return FitStatus::NonFinite;
+}
+
+// Exact Newton steps; the sums of the last one also give the covariance.
+void
+polish(const SurfaceProblem& problem, const FitOptions& options, SurfaceFit& fit)
+{
+  kernel::CovarianceSums sums;
+  for (fit.polish_steps = 1; fit.polish_steps <= kMaxPolishSteps; ++fit.polish_steps) {
+    kernel::accumulateCovariance(problem.model,
+                                 problem.residual,
+                                 problem.points,
+                                 kernelState(fit.surface, problem.scatter),
+                                 sums);
+    fit.linearization = linearize(fit.surface, problem.scatter, sums);
+    fit.cost = sums.cost;
+    const Eigen::LLT<ThetaMatrix> cholesky(fit.linearization.H);
+    if (cholesky.info() != Eigen::Success ||
+        smallestPivot(fit.linearization.H) < kSmallestPivot) {
+      fit.status = FitStatus::Degenerate;
+      return;
+    }
+    const Theta gradient = fullGradient(fit.surface, problem.scatter, sums.L);
+    const Theta step = -cholesky.solve(gradient);
+    fit.surface = retracted(fit.surface, problem.scatter, step);
+    if (std::sqrt(std::max(0.0, -step.dot(gradient))) < options.polish_tolerance_sigma)
+      return;
+  }
+  fit.status = FitStatus::IterationLimit;
+}
+
+} // namespace
+
+kernel::Points
+kernelPoints(const PointBatch& batch)
+{
+  kernel::Points points;
+  for (int i = 0; i < PointBatch::kChannels; ++i)
+    points.channel[i] = batch.channel(static_cast<PointBatch::Channel>(i));
+  points.padded_size = batch.paddedSize();
+  return points;
+}
+
+kernel::State
+kernelState(const UnboundedSurface& surface, const Scatter& scatter)
+{
+  kernel::State state;
+  const Eigen::Vector3d line = surface.R.transpose() * scatter.normal();
+  const Eigen::Vector3d centroid = surface.R.transpose() * (scatter.mean - surface.c);
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j)
+      state.R[3 * i + j] = surface.R(i, j);
+    state.c[i] = surface.c[i];
+    state.k[i] = surface.k[i];
+    state.line[i] = line[i];
+    state.centroid[i] = centroid[i];
+  }
+  return state;
+}
+
+Scatter
+measureScatter(const PointBatch& batch, bool debias, const Eigen::Vector3d& viewpoint)
+{
+  kernel::ScatterSums sums;
+  kernel::accumulateScatter(kernelPoints(batch), sums);
+  Scatter scatter;
+  scatter.count = batch.size();
+  const double inverse = 1.0 / scatter.count;
+  constexpr int kIndex[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+  for (int i = 0; i < 3; ++i)
+    scatter.mean[i] = sums.q[i] * inverse;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      scatter.covariance(i, j) =
+          sums.qq[kIndex[i][j]] * inverse - scatter.mean[i] * scatter.mean[j];
+      if (debias)
+        scatter.covariance(i, j) -= sums.sigma[kIndex[i][j]] * inverse;
+    }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(scatter.covariance);
+  scatter.eigenvalues = solver.eigenvalues();
+  const bool away = solver.eigenvectors().col(0).dot(viewpoint - scatter.mean) < 0.0;
+  scatter.axes.col(2) = (away ? -1.0 : 1.0) * solver.eigenvectors().col(0);
+  scatter.axes.col(0) = solver.eigenvectors().col(2);
+  scatter.axes.col(1) = scatter.axes.col(2).cross(scatter.axes.col(0));
+  return scatter;
+}
+
+Eigen::Matrix3d
+normalDerivative(const Eigen::Matrix3d& C, const Eigen::Vector3d& n)
+{
+  const Eigen::Matrix<double, 3, 2> B = frameFromZ(n).leftCols<2>();
+  const Eigen::Matrix2d gap =
+      n.dot(C * n) * Eigen::Matrix2d::Identity() - B.transpose() * C * B;
+  return B * gap.inverse() * B.transpose();
+}
+
+Matrix36
+normalJacobian(const Eigen::Matrix3d& C, const Eigen::Vector3d& n)
+{
+  const Eigen::Matrix3d P = normalDerivative(C, n);
+  Matrix36 J;
+  J.col(0) = P.col(0) * n[0];
+  J.col(1) = P.col(0) * n[1] + P.col(1) * n[0];
+  J.col(2) = P.col(0) * n[2] + P.col(2) * n[0];
+  J.col(3) = P.col(1) * n[1];
+  J.col(4) = P.col(1) * n[2] + P.col(2) * n[1];
+  J.col(5) = P.col(2) * n[2];
+  return J;
+}
+
+SurfaceFit
+fitSurface(kernel::Model model,
+           const PointBatch& batch,
+           const Scatter& scatter,
+           const FitOptions& options,
+           NullSpace& null_space)
+{
+  const SurfaceProblem problem{model, options.residual, kernelPoints(batch), scatter};
+  SurfaceFit fit;
+  fit.surface = surfaceStart(model, options.residual, problem.points, scatter);
+  SurfaceProblem::Evaluation evaluation;
+  const LevenbergMarquardtOptions lm{options.max_iterations,
+                                     options.step_tolerance_sigma};
+  const auto summary = levenbergMarquardt(problem, lm, fit.surface, evaluation);
+  fit.iterations = summary.iterations;
+  fit.status = statusOf(summary.stop);
+  fit.cost = evaluation.cost;
+  fit.JtJ = evaluation.JtJ;
+  if (fit.status != FitStatus::NonFinite &&
+      smallestPivot(evaluation.JtJ) < kSmallestPivot)
+    fit.status = FitStatus::Degenerate;
+  if (fit.status == FitStatus::Converged)
+    polish(problem, options, fit);
+  if (fit.status == FitStatus::Degenerate)
+    null_space = nullSpaceOf(evaluation.JtJ, kernel::parameterCount(model));
+  return fit;
+}
+
+ThetaMatrix
+thetaCovariance(const Linearization& l, const ThetaMatrix& hessian)
+{
+  // lazyProduct: for matrices this small Eigen's blocked product costs more than the
+  // work.
+  const ThetaByMoments half = l.XD + 0.5 * l.A.lazyProduct(l.DD);
+  const ThetaMatrix cross = half.lazyProduct(l.A.transpose());
+  const ThetaMatrix inverse = hessian.llt().solve(ThetaMatrix(ThetaMatrix::Identity()));
+  return inverse.lazyProduct(
+      ThetaMatrix((l.XX + cross + cross.transpose()).lazyProduct(inverse)));
+}
+
+} // namespace holdfast

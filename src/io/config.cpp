@@ -1,0 +1,291 @@
+#include <holdfast/io/config.h>
+#include <holdfast/sensor/noise_registry.h>
+#include <holdfast/sensor/parameter_error.h>
+
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <map>
+#include <set>
+#include <stdexcept>
+#include <utility>
+
+namespace holdfast {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Counted from 1, also for an empty file, whose content is nowhere.
+int
+lineOf(const YAML::Mark& mark)
+{
+  return std::max(mark.line, 0) + 1;
+}
+
+/// One map of a YAML file; knows where it stands, for messages, and which of its keys
+/// were read, to find those nobody asked for.
+class Section {
+public:
+  /// \param line of the key that introduces the map; \param path its name, with those
+  /// of the maps around it.
+  Section(const YAML::Node& node, std::string file, int line = 1, std::string path = "")
+  : file_(std::move(file)), line_(line), path_(std::move(path))
+  {
+    if (!node.IsMap())
+      failAt(line, path_.empty() ? "file" : path_, "must be a list of `key: value`");
+    for (const auto& entry : node) {
+      const int entry_line = lineOf(entry.first.Mark());
+      if (!entry.first.IsScalar())
+        failAt(entry_line, path_.empty() ? "file" : path_, "has a key that is no name");
+      const std::string& name = entry.first.Scalar();
+      if (!entries_.insert({name, {entry.second, entry_line, false}}).second)
+        failAt(entry_line, fullName(name), "is given twice");
+    }
+  }
+
+  bool has(const std::string& name) const
+  {
+    return entries_.count(name) > 0;
+  }
+
+  std::string text(const std::string& name)
+  {
+    const YAML::Node value = read(name).value;
+    if (!value.IsScalar() || value.Scalar().empty())
+      fail(name, "must be a word");
+    return value.Scalar();
+  }
+
+  double number(const std::string& name)
+  {
+    double result = 0.0;
+    if (!YAML::convert<double>::decode(read(name).value, result) ||
+        !std::isfinite(result))
+      fail(name, "must be a finite number");
+    return result;
+  }
+
+  double positive(const std::string& name)
+  {
+    const double result = number(name);
+    if (result <= 0.0)
+      fail(name, "must be > 0");
+    return result;
+  }
+
+  int pixels(const std::string& name)
+  {
+    // More than any image sensor has, less than overflows an index.
+    constexpr int kMaximum = 20000;
+    int result = 0;
+    if (!YAML::convert<int>::decode(read(name).value, result) || result < 1 ||
+        result > kMaximum)
+      fail(name, "must be a whole number from 1 to " + std::to_string(kMaximum));
+    return result;
+  }
+
+  Section section(const std::string& name)
+  {
+    const Entry& entry = read(name);
+    return Section(entry.value, file_, entry.line, fullName(name));
+  }
+
+  /// To be called once all keys were read.
+  void rejectUnknown() const
+  {
+    for (const auto& [name, entry] : entries_)
+      if (!entry.used)
+        fail(name, "is not a known key");
+  }
+
+  /// \throw std::runtime_error about the entry of that name.
+  [[noreturn]] void fail(const std::string& name, const std::string& problem) const
+  {
+    failAt(entries_.at(name).line, fullName(name), problem);
+  }
+
+private:
+  struct Entry {
+    YAML::Node value;
+    int line = 0;
+    bool used = false;
+  };
+
+  std::string fullName(const std::string& name) const
+  {
+    return path_.empty() ? name : path_ + "." + name;
+  }
+
+  const Entry& read(const std::string& name)
+  {
+    const auto found = entries_.find(name);
+    if (found == entries_.end())
+      failAt(line_, fullName(name), "is missing");
+    found->second.used = true;
+    return found->second;
+  }
+
+  [[noreturn]] void failAt(int line,
+                           const std::string& what,
+                           const std::string& problem) const
+  {
+    throw std::runtime_error(file_ + ":" + std::to_string(line) + ": " + what + " " +
+                             problem);
+  }
+
+  std::string file_;
+  int line_;
+  std::string path_;
+  std::map<std::string, Entry> entries_;
+};
+
+Camera
+readCamera(Section section)
+{
+  Camera camera;
+  camera.width = section.pixels("width");
+  camera.height = section.pixels("height");
+  camera.fx = section.positive("fx");
+  camera.fy = section.positive("fy");
+  camera.cx = section.number("cx");
+  camera.cy = section.number("cy");
+  section.rejectUnknown();
+  return camera;
+}
+
+void
+readRange(Section section, Sensor& sensor)
+{
+  sensor.min_range_m = section.number("min_m");
+  sensor.max_range_m = section.number("max_m");
+  if (sensor.min_range_m < 0.0)
+    section.fail("min_m", "must be >= 0");
+  if (sensor.max_range_m <= sensor.min_range_m)
+    section.fail("max_m", "must be larger than min_m");
+  section.rejectUnknown();
+}
+
+void
+readDisparity(Section section, Sensor& sensor)
+{
+  sensor.baseline_m = section.positive("baseline_m");
+  sensor.disparity_focal_px = section.positive("focal_px");
+  if (section.has("quantum_px"))
+    sensor.disparity_quantum_px = section.positive("quantum_px");
+  section.rejectUnknown();
+}
+
+/// \param shared values that the model may take from elsewhere in the file.
+NoiseModel::ConstPtr
+readNoise(Section section, const NoiseParameters& shared)
+{
+  const std::string model = section.text("model");
+  const NoiseModelKind* kind = findNoiseModelKind(model);
+  if (kind == nullptr)
+    section.fail("model", "names no noise model: " + model);
+  NoiseParameters parameters;
+  for (const NoiseParameter& parameter : kind->parameters) {
+    const std::string& name = parameter.name;
+    if (!section.has(name) && shared.count(name) > 0)
+      parameters[name] = shared.at(name);
+    else if (section.has(name) || parameter.required)
+      parameters[name] = section.number(name);
+  }
+  section.rejectUnknown();
+  try {
+    return makeNoiseModel(model, parameters);
+  }
+  catch (const ParameterError& error) {
+    section.fail(error.parameter(), error.problem());
+  }
+}
+
+Sensor
+readSensor(const YAML::Node& node, const std::string& file)
+{
+  Section root(node, file);
+  Sensor sensor;
+  sensor.name = root.text("name");
+  sensor.camera = readCamera(root.section("camera"));
+  readRange(root.section("range"), sensor);
+  NoiseParameters shared;
+  if (root.has("disparity")) {
+    readDisparity(root.section("disparity"), sensor);
+    shared = {{"baseline_m", sensor.baseline_m},
+              {"focal_px", sensor.disparity_focal_px}};
+  }
+  sensor.noise = readNoise(root.section("noise"), shared);
+  root.rejectUnknown();
+  return sensor;
+}
+
+/// The folders of built-in sensors, the most specific first.
+std::vector<fs::path>
+sensorFolders()
+{
+  std::vector<fs::path> folders;
+  if (const char* chosen = std::getenv("HOLDFAST_CONFIG_DIR"))
+    folders.push_back(fs::path(chosen) / "sensors");
+  folders.push_back(fs::path(HOLDFAST_CONFIG_DIR_INSTALL) / "sensors");
+  folders.push_back(fs::path(HOLDFAST_CONFIG_DIR_SOURCE) / "sensors");
+  return folders;
+}
+
+bool
+isFile(const fs::path& path)
+{
+  std::error_code ignored;
+  return fs::is_regular_file(path, ignored);
+}
+
+fs::path
+findSensor(const std::string& name_or_path)
+{
+  if (isFile(name_or_path))
+    return name_or_path;
+  // Anything with a separator is meant as a path, never as a name.
+  if (fs::path(name_or_path).filename() == name_or_path)
+    for (const fs::path& folder : sensorFolders())
+      if (isFile(folder / (name_or_path + ".yaml")))
+        return folder / (name_or_path + ".yaml");
+  std::string known;
+  for (const std::string& name : listSensors())
+    known += (known.empty() ? "" : ", ") + name;
+  throw std::runtime_error("sensor " + name_or_path +
+                           ": no such file, and no built-in sensor of that name (" +
+                           known + ")");
+}
+
+} // namespace
+
+Sensor
+loadSensor(const std::string& name_or_path)
+{
+  const std::string file = findSensor(name_or_path).string();
+  try {
+    return readSensor(YAML::LoadFile(file), file);
+  }
+  catch (const YAML::Exception& error) {
+    throw std::runtime_error(file + ":" + std::to_string(lineOf(error.mark)) + ": " +
+                             error.msg);
+  }
+}
+
+std::vector<std::string>
+listSensors()
+{
+  std::set<std::string> names;
+  for (const fs::path& folder : sensorFolders()) {
+    std::error_code ignored;
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored))
+      if (entry.path().extension() == ".yaml")
+        names.insert(entry.path().stem().string());
+  }
+  return {names.begin(), names.end()};
+}
+
+} // namespace holdfast

@@ -1,0 +1,377 @@
+#include <holdfast/io/patch_io.h>
+#include <holdfast/patch/tessellation.h>
+#include <holdfast/version.h>
+
+#include <nlohmann/json.hpp>
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <stdexcept>
+
+namespace holdfast {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::array<std::string_view, 9> kSurfaceRequests{"auto",
+                                                           "paraboloid",
+                                                           "plane",
+                                                           "sphere",
+                                                           "circular_cylinder",
+                                                           "elliptic_paraboloid",
+                                                           "hyperbolic_paraboloid",
+                                                           "cylindric_paraboloid",
+                                                           "circular_paraboloid"};
+constexpr std::array<std::string_view, 4> kNeighborhoods{"disc",
+                                                         "ball",
+                                                         "geodesic",
+                                                         "knn"};
+constexpr std::array<std::string_view, 3> kSeedStrategies{"grid", "random", "poisson"};
+constexpr std::array<std::string_view, 2> kResiduals{"sampson", "ray"};
+
+template <std::size_t N, typename Enum>
+std::string_view
+nameOf(const std::array<std::string_view, N>& names, Enum value)
+{
+  return names.at(static_cast<std::size_t>(value));
+}
+
+template <typename Derived>
+Json
+vectorJson(const Eigen::MatrixBase<Derived>& v)
+{
+  Json array = Json::array();
+  for (Eigen::Index i = 0; i < v.size(); ++i)
+    array.push_back(v(i));
+  return array;
+}
+
+Json
+matrixJson(const ParameterMatrix& m)
+{
+  Json rows = Json::array();
+  for (Eigen::Index i = 0; i < m.rows(); ++i)
+    rows.push_back(vectorJson(m.row(i).transpose()));
+  return rows;
+}
+
+Json
+sensorJson(const Sensor& sensor, const Pose& pose)
+{
+  const Camera& camera = sensor.camera;
+  const Eigen::Quaterniond q(pose.R);
+  return {{"name", sensor.name},
+          {"noise", sensor.noise ? Json(sensor.noise->name()) : Json()},
+          {"camera",
+           {{"width", camera.width},
+            {"height", camera.height},
+            {"fx", camera.fx},
+            {"fy", camera.fy},
+            {"cx", camera.cx},
+            {"cy", camera.cy}}},
+          {"position", vectorJson(pose.c)},
+          {"orientation_wxyz", {q.w(), q.x(), q.y(), q.z()}}};
+}
+
+Json
+samplerJson(const SamplerOptions& sampler)
+{
+  Json json = {{"neighborhood", nameOf(kNeighborhoods, sampler.neighborhood)}};
+  if (sampler.neighborhood == Neighborhood::Knn)
+    json["k"] = sampler.k;
+  else
+    json["radius"] = sampler.radius_m;
+  json["seed_strategy"] = nameOf(kSeedStrategies, sampler.strategy);
+  json["seeds"] = sampler.max_seeds > 0 ? Json(sampler.max_seeds) : Json();
+  json["spacing"] = sampler.spacing_m;
+  json["random_seed"] = sampler.random_seed;
+  return json;
+}
+
+Json
+optionsJson(const PatchReport& report)
+{
+  const FitOptions& fit = report.options.fit;
+  return {{"whole", report.whole},
+          {"sampler", report.whole ? Json() : samplerJson(report.options.sampler)},
+          {"surface", nameOf(kSurfaceRequests, fit.surface)},
+          {"boundary",
+           fit.plane_boundary ? Json(boundaryName(*fit.plane_boundary)) : Json()},
+          {"containment", fit.containment},
+          {"curvature_tolerance", fit.curvature_tolerance_per_m},
+          {"discrimination_level", fit.discrimination_level},
+          {"residual", nameOf(kResiduals, fit.residual)},
+          {"debias_scatter", fit.debias_scatter},
+          {"normal_from_pca", fit.normal_from_pca},
+          {"smooth_circle_radius", fit.smooth_circle_radius},
+          {"statistical_discrimination", fit.statistical_discrimination},
+          {"covariance", covarianceModeName(report.options.covariance)}};
+}
+
+Json
+patchJson(const ExtractedPatch& extracted, CovarianceMode mode)
+{
+  const FitResult& fit = extracted.fit;
+  const PatchType type = fit.patch.type;
+  Json seed;
+  if (extracted.seed_index)
+    seed = {{"index", *extracted.seed_index}, {"point", vectorJson(extracted.seed)}};
+  return {{"surface", surfaceName(type.surface)},
+          {"boundary", boundaryName(type.boundary)},
+          {"dof", degreesOfFreedom(type)},
+          {"names", parameterNames(type)},
+          {"parameters", vectorJson(pack(fit.patch))},
+          {"covariance", matrixJson(fit.covariance)},
+          {"covariance_mode", covarianceModeName(mode)},
+          {"status", statusName(fit.status)},
+          {"points", fit.points},
+          {"chi2", fit.chi2},
+          {"chi2_dof", fit.chi2_dof},
+          {"iterations", fit.iterations},
+          {"seed", seed},
+          {"radius", extracted.seed_index ? Json(extracted.radius_m) : Json()}};
+}
+
+Json
+timingJson(const PatchReport& report)
+{
+  const double seconds = 1e-3 * report.fit_ms;
+  const auto patches = static_cast<double>(report.result.patches.size());
+  return {{"load_ms", report.load_ms},
+          {"fit_ms", report.fit_ms},
+          {"patches_per_second", seconds > 0.0 ? Json(patches / seconds) : Json()}};
+}
+
+Json
+rejectedJson(const std::map<FitStatus, int>& rejected)
+{
+  Json json = Json::object();
+  for (const auto& [status, count] : rejected)
+    json[std::string(statusName(status))] = count;
+  return json;
+}
+
+/// File names need not be UTF-8; JSON must.
+std::string
+text(const Json& json)
+{
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+FitStatus
+statusFromName(const std::string& name)
+{
+  for (int i = 0; i <= static_cast<int>(FitStatus::NonFinite); ++i)
+    if (statusName(static_cast<FitStatus>(i)) == name)
+      return static_cast<FitStatus>(i);
+  throw std::runtime_error("unknown status '" + name + "'");
+}
+
+double
+number(const Json& json)
+{
+  return json.is_null() ? std::numeric_limits<double>::quiet_NaN() : json.get<double>();
+}
+
+PatchType
+typeFromJson(const Json& json)
+{
+  const auto surface = surfaceFromName(json.at("surface").get<std::string>());
+  const auto boundary = boundaryFromName(json.at("boundary").get<std::string>());
+  if (!surface || !boundary || !isLegal({*surface, *boundary}))
+    throw std::runtime_error("unknown patch type");
+  return {*surface, *boundary};
+}
+
+void
+readNumbers(const Json& json, FitResult& fit)
+{
+  const PatchType type = typeFromJson(json);
+  const auto n = static_cast<std::size_t>(degreesOfFreedom(type));
+  const Json& parameters = json.at("parameters");
+  const Json& covariance = json.at("covariance");
+  if (parameters.size() != n || covariance.size() != n)
+    throw std::runtime_error("a patch does not have its degrees of freedom");
+  ParameterVector vector(static_cast<Eigen::Index>(n));
+  fit.covariance.resize(vector.size(), vector.size());
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    vector(row) = number(parameters[i]);
+    if (covariance[i].size() != n)
+      throw std::runtime_error("a covariance is not square");
+    for (std::size_t j = 0; j < n; ++j)
+      fit.covariance(row, static_cast<Eigen::Index>(j)) = number(covariance[i][j]);
+  }
+  fit.patch = unpack(type, vector);
+}
+
+ExtractedPatch
+patchFromJson(const Json& json)
+{
+  ExtractedPatch extracted;
+  FitResult& fit = extracted.fit;
+  readNumbers(json, fit);
+  fit.status = statusFromName(json.at("status"));
+  fit.points = json.at("points");
+  fit.chi2 = number(json.at("chi2"));
+  fit.chi2_dof = json.at("chi2_dof");
+  fit.iterations = json.at("iterations");
+  if (const Json& seed = json.at("seed"); !seed.is_null()) {
+    extracted.seed_index = seed.at("index").get<int>();
+    for (Eigen::Index i = 0; i < 3; ++i)
+      extracted.seed(i) = number(seed.at("point").at(static_cast<std::size_t>(i)));
+    extracted.radius_m = number(json.at("radius"));
+  }
+  return extracted;
+}
+
+/// All meshes as one.
+struct ColoredMesh {
+  std::vector<Eigen::Vector3f> vertices;
+  std::vector<std::array<std::uint8_t, 3>> colors; ///< one per vertex
+  std::vector<std::array<std::int32_t, 3>> triangles;
+};
+
+ColoredMesh
+meshOf(const std::vector<ExtractedPatch>& patches)
+{
+  ColoredMesh all;
+  for (const ExtractedPatch& extracted : patches) {
+    const Patch& patch = extracted.fit.patch;
+    // Bounds are half-lengths; gamma, the last of the five, is an angle.
+    const double length = 2.0 * patch.d.head<4>().maxCoeff();
+    const Mesh mesh = tessellate(patch, length / 8.0);
+    const auto first = static_cast<std::int32_t>(all.vertices.size());
+    for (const Eigen::Vector3d& vertex : mesh.vertices)
+      all.vertices.emplace_back(vertex.cast<float>());
+    all.colors.resize(all.vertices.size(), surfaceColor(patch.type.surface));
+    for (const auto& t : mesh.triangles)
+      all.triangles.push_back({first + t[0], first + t[1], first + t[2]});
+  }
+  return all;
+}
+
+template <typename T>
+void
+writeRaw(std::ostream& out, const T* values, std::size_t n)
+{
+  out.write(reinterpret_cast<const char*>(values),
+            static_cast<std::streamsize>(n * sizeof(T)));
+}
+
+void
+writeMeshText(std::ostream& out, const ColoredMesh& mesh)
+{
+  out.precision(9);
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    const auto& v = mesh.vertices[i];
+    out << v.x() << ' ' << v.y() << ' ' << v.z();
+    for (const std::uint8_t channel : mesh.colors[i])
+      out << ' ' << static_cast<int>(channel);
+    out << '\n';
+  }
+  for (const auto& t : mesh.triangles)
+    out << "3 " << t[0] << ' ' << t[1] << ' ' << t[2] << '\n';
+}
+
+void
+writeMeshBinary(std::ostream& out, const ColoredMesh& mesh)
+{
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    writeRaw(out, mesh.vertices[i].data(), 3);
+    writeRaw(out, mesh.colors[i].data(), 3);
+  }
+  for (const auto& t : mesh.triangles) {
+    out.put('\3');
+    writeRaw(out, t.data(), 3);
+  }
+}
+
+} // namespace
+
+void
+writeJson(std::ostream& out, const PatchReport& report, JsonLayout layout)
+{
+  const bool one_line = layout == JsonLayout::OneLine;
+  const std::string_view gap = one_line ? "" : "\n";
+  const auto member = [&](const char* name, const Json& value) {
+    out << '"' << name << "\":" << text(value) << ',' << gap;
+  };
+  out << '{' << gap;
+  member("holdfast", HOLDFAST_VERSION);
+  member("cloud", report.cloud);
+  member("sensor", sensorJson(report.sensor, report.sensor_pose));
+  member("options", optionsJson(report));
+  out << "\"patches\":[" << gap;
+  for (std::size_t i = 0; i < report.result.patches.size(); ++i)
+    out << (i == 0   ? "" :
+            one_line ? "," :
+                       ",\n")
+        << text(patchJson(report.result.patches[i], report.options.covariance));
+  out << gap << "]," << gap;
+  member("rejected", rejectedJson(report.result.rejected));
+  out << "\"timing\":" << text(timingJson(report)) << gap << "}\n";
+}
+
+PatchReport
+readJson(const std::string& text)
+{
+  try {
+    const Json json = Json::parse(text);
+    PatchReport report;
+    report.cloud = json.at("cloud");
+    for (const Json& patch : json.at("patches"))
+      report.result.patches.push_back(patchFromJson(patch));
+    for (const auto& [name, count] : json.at("rejected").items())
+      report.result.rejected[statusFromName(name)] = count;
+    return report;
+  }
+  catch (const Json::exception& error) {
+    throw std::runtime_error(std::string("no result of holdfast: ") + error.what());
+  }
+}
+
+void
+writeMesh(std::ostream& out, const std::vector<ExtractedPatch>& patches, bool ascii)
+{
+  const ColoredMesh mesh = meshOf(patches);
+  out << "ply\nformat " << (ascii ? "ascii" : "binary_little_endian")
+      << " 1.0\ncomment bounded patches, coloured by surface type\nelement vertex "
+      << mesh.vertices.size()
+      << "\nproperty float x\nproperty float y\nproperty float z\n"
+         "property uchar red\nproperty uchar green\nproperty uchar blue\nelement face "
+      << mesh.triangles.size()
+      << "\nproperty list uchar int vertex_indices\nend_header\n";
+  if (ascii)
+    writeMeshText(out, mesh);
+  else
+    writeMeshBinary(out, mesh);
+}
+
+std::array<std::uint8_t, 3>
+surfaceColor(SurfaceType surface)
+{
+  // Okabe and Ito's palette, which colour-blind people can tell apart.
+  switch (surface) {
+  case SurfaceType::Plane:
+    return {153, 153, 153};
+  case SurfaceType::Sphere:
+    return {240, 228, 66};
+  case SurfaceType::CircularCylinder:
+    return {204, 121, 167};
+  case SurfaceType::EllipticParaboloid:
+    return {0, 114, 178};
+  case SurfaceType::HyperbolicParaboloid:
+    return {213, 94, 0};
+  case SurfaceType::CylindricParaboloid:
+    return {0, 158, 115};
+  case SurfaceType::CircularParaboloid:
+    return {86, 180, 233};
+  }
+  throw std::invalid_argument("unknown surface type");
+}
+
+} // namespace holdfast

@@ -1,0 +1,121 @@
+#include "cloud_readers.h"
+
+#include <algorithm>
+#include <charconv>
+
+namespace holdfast::io {
+namespace {
+
+constexpr std::string_view kBlanks = " \t\r\n\v\f";
+
+template <typename T>
+double
+readAs(const char* bytes)
+{
+  T value;
+  std::memcpy(&value, bytes, sizeof(T));
+  return static_cast<double>(value);
+}
+
+template <typename T>
+std::optional<T>
+parseWhole(std::string_view word)
+{
+  T value{};
+  const char* end = word.data() + word.size();
+  const auto result = std::from_chars(word.data(), end, value);
+  if (word.empty() || result.ec != std::errc() || result.ptr != end)
+    return std::nullopt;
+  return value;
+}
+
+} // namespace
+
+std::optional<std::string_view>
+takeLine(std::string_view& text)
+{
+  if (text.empty())
+    return std::nullopt;
+  const std::size_t end = text.find('\n');
+  std::string_view line = text.substr(0, end);
+  text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+  if (!line.empty() && line.back() == '\r')
+    line.remove_suffix(1);
+  return line;
+}
+
+std::string_view
+takeWord(std::string_view& text)
+{
+  text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
+  const std::string_view word = text.substr(0, text.find_first_of(kBlanks));
+  text.remove_prefix(word.size());
+  return word;
+}
+
+std::vector<std::string_view>
+splitWords(std::string_view line)
+{
+  std::vector<std::string_view> words;
+  for (auto word = takeWord(line); !word.empty(); word = takeWord(line))
+    words.push_back(word);
+  return words;
+}
+
+std::optional<double>
+parseNumber(std::string_view word)
+{
+  // from_chars takes no plus sign.
+  if (word.size() > 1 && word[0] == '+' && word[1] != '-')
+    word.remove_prefix(1);
+  return parseWhole<double>(word);
+}
+
+std::optional<std::uint64_t>
+parseCount(std::string_view word)
+{
+  return parseWhole<std::uint64_t>(word);
+}
+
+std::optional<std::uint64_t>
+product(std::uint64_t a, std::uint64_t b, std::uint64_t c)
+{
+  std::uint64_t ab = 0;
+  std::uint64_t abc = 0;
+  if (__builtin_mul_overflow(a, b, &ab) || __builtin_mul_overflow(ab, c, &abc))
+    return std::nullopt;
+  return abc;
+}
+
+bool
+ScalarType::isValid() const
+{
+  if (kind == 'F')
+    return size == 4 || size == 8;
+  return (kind == 'I' || kind == 'U') &&
+         (size == 1 || size == 2 || size == 4 || size == 8);
+}
+
+double
+ScalarType::read(const char* bytes, bool swap) const
+{
+  char ordered[8];
+  std::memcpy(ordered, bytes, static_cast<std::size_t>(size));
+  if (swap)
+    std::reverse(ordered, ordered + size);
+  if (kind == 'F')
+    return size == 4 ? readAs<float>(ordered) : readAs<double>(ordered);
+  const bool is_signed = kind == 'I';
+  switch (size) {
+  case 1:
+    return is_signed ? readAs<std::int8_t>(ordered) : readAs<std::uint8_t>(ordered);
+  case 2:
+    return is_signed ? readAs<std::int16_t>(ordered) : readAs<std::uint16_t>(ordered);
+  case 4:
+    return is_signed ? readAs<std::int32_t>(ordered) : readAs<std::uint32_t>(ordered);
+  default:
+    return is_signed ? readAs<std::int64_t>(ordered) : readAs<std::uint64_t>(ordered);
+  }
+}
+
+} // namespace holdfast::io

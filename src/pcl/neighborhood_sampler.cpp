@@ -1,0 +1,430 @@
+#include <holdfast/pcl/neighborhood_sampler.h>
+
+#include "path_search.h"
+#include "pixel_disc.h"
+#include "seeds.h"
+
+#include <pcl/common/point_tests.h>
+#include <pcl/kdtree/kdtree_flann.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+namespace holdfast {
+
+namespace {
+
+bool
+isPositive(double x)
+{
+  return std::isfinite(x) && x > 0.0;
+}
+
+bool
+isNotNegative(double x)
+{
+  return std::isfinite(x) && x >= 0.0;
+}
+
+} // namespace
+
+struct NeighborhoodSampler::Scratch {
+  std::vector<Run> runs;
+  std::vector<PathEnd> heap;
+  std::vector<float> path_length;
+  std::vector<int> ball;
+  pcl::Indices found;
+  std::vector<float> squared_distances;
+};
+
+void
+NeighborhoodSampler::ScratchDeleter::operator()(Scratch* scratch) const
+{
+  delete scratch;
+}
+
+struct NeighborhoodSampler::Impl {
+  Impl(const RangeCloud& the_cloud, const Sensor& the_sensor, const SamplerOptions& o);
+
+  void buildTree();
+
+  bool isValid(int index) const;
+  std::vector<int> validPoints() const;
+  std::vector<int> gridSeeds(int max_seeds) const;
+  std::vector<int> seeds() const;
+
+  void disc(int seed, Scratch& scratch, std::vector<int>& indices) const;
+  void ball(int seed, Scratch& scratch, std::vector<int>& indices) const;
+  void geodesic(int seed, Scratch& scratch, std::vector<int>& indices) const;
+  void knn(int seed, Scratch& scratch, std::vector<int>& indices) const;
+
+  void gridBall(int seed, std::vector<int>& indices) const;
+  void treeBall(int seed, Scratch& scratch, std::vector<int>& indices) const;
+  void gridGeodesic(int seed, Scratch& scratch, std::vector<int>& indices) const;
+  void treeGeodesic(int seed, Scratch& scratch, std::vector<int>& indices) const;
+
+  Eigen::Vector3d inCamera(int index) const;
+  PixelWindow windowAround(int seed) const;
+  JumpLimit jumpLimit(int seed) const;
+  float distance(int a, int b) const;
+
+  const RangeCloud& cloud;
+  const pcl::PointCloud<pcl::PointXYZ>& points;
+  NoiseModel::ConstPtr noise;
+  SamplerOptions options;
+  std::optional<PixelGrid> grid;
+  pcl::KdTreeFLANN<pcl::PointXYZ> tree{false};
+};
+
+namespace {
+
+const RangeCloud&
+checked(const RangeCloud& cloud)
+{
+  const std::string error = validityError(cloud);
+  if (!error.empty())
+    throw std::invalid_argument(error);
+  return cloud;
+}
+
+} // namespace
+
+NeighborhoodSampler::Impl::Impl(const RangeCloud& the_cloud,
+                                const Sensor& the_sensor,
+                                const SamplerOptions& o)
+: cloud(checked(the_cloud)), points(*cloud.points), noise(the_sensor.noise), options(o)
+{
+  const std::string error = validityError(options);
+  if (!error.empty())
+    throw std::invalid_argument(error);
+  if (!noise)
+    throw std::invalid_argument("the sensor has no noise model");
+  grid = makePixelGrid(cloud, the_sensor);
+  if (!grid || options.neighborhood == Neighborhood::Knn)
+    buildTree();
+}
+
+void
+NeighborhoodSampler::Impl::buildTree()
+{
+  const std::vector<int> valid = validPoints();
+  // The tree prints an error of its own when there is nothing to put into it.
+  if (valid.empty())
+    return;
+  tree.setInputCloud(cloud.points,
+                     pcl::make_shared<const pcl::Indices>(valid.begin(), valid.end()));
+}
+
+bool
+NeighborhoodSampler::Impl::isValid(int index) const
+{
+  return grid ? !std::isnan(grid->depth[static_cast<std::size_t>(index)]) :
+                pcl::isFinite(points[index]);
+}
+
+std::vector<int>
+NeighborhoodSampler::Impl::validPoints() const
+{
+  std::vector<int> valid;
+  for (int i = 0; i < static_cast<int>(points.size()); ++i)
+    if (isValid(i))
+      valid.push_back(i);
+  return valid;
+}
+
+Eigen::Vector3d
+NeighborhoodSampler::Impl::inCamera(int index) const
+{
+  return cloud.sensor_pose.toLocal(points[index].getVector3fMap().cast<double>());
+}
+
+PixelWindow
+NeighborhoodSampler::Impl::windowAround(int seed) const
+{
+  return grid->ballWindow(inCamera(seed), options.radius_m);
+}
+
+float
+NeighborhoodSampler::Impl::distance(int a, int b) const
+{
+  return (points[a].getVector3fMap() - points[b].getVector3fMap()).norm();
+}
+
+JumpLimit
+NeighborhoodSampler::Impl::jumpLimit(int seed) const
+{
+  const Eigen::Vector3d q = inCamera(seed);
+  double variance = 0.0;
+  if (cloud.covariances.empty())
+    variance = noise->covariance(q)(2, 2);
+  else {
+    const Eigen::Vector3d axis = cloud.sensor_pose.R.col(2);
+    const Eigen::Matrix3d S =
+        cloud.covariances[static_cast<std::size_t>(seed)].cast<double>();
+    variance = axis.dot(S * axis);
+  }
+  // A covariance that is none (negative, NaN) is no reason to cut.
+  const double sigma = variance > 0.0 ? std::sqrt(variance) : 0.0;
+  return {static_cast<float>(options.jump_sigmas * sigma), options.max_slope * q.z()};
+}
+
+void
+NeighborhoodSampler::Impl::disc(int seed,
+                                Scratch& scratch,
+                                std::vector<int>& indices) const
+{
+  connectedDisc(*grid, seed, options.radius_m, jumpLimit(seed), scratch.runs, indices);
+}
+
+void
+NeighborhoodSampler::Impl::ball(int seed,
+                                Scratch& scratch,
+                                std::vector<int>& indices) const
+{
+  if (grid)
+    gridBall(seed, indices);
+  else
+    treeBall(seed, scratch, indices);
+}
+
+void
+NeighborhoodSampler::Impl::gridBall(int seed, std::vector<int>& indices) const
+{
+  const PixelWindow window = windowAround(seed);
+  const Eigen::Vector3f centre = points[seed].getVector3fMap();
+  const float squared_radius = static_cast<float>(options.radius_m * options.radius_m);
+  for (int v = window.rows.begin; v < window.rows.end; ++v) {
+    const float* depth = grid->row(v);
+    for (int u = window.columns.begin; u < window.columns.end; ++u) {
+      const int i = v * grid->camera.width + u;
+      const float d = (points[i].getVector3fMap() - centre).squaredNorm();
+      if (d <= squared_radius && !std::isnan(depth[u]))
+        indices.push_back(i);
+    }
+  }
+}
+
+void
+NeighborhoodSampler::Impl::treeBall(int seed,
+                                    Scratch& scratch,
+                                    std::vector<int>& indices) const
+{
+  tree.radiusSearch(points[seed],
+                    options.radius_m,
+                    scratch.found,
+                    scratch.squared_distances);
+  indices.assign(scratch.found.begin(), scratch.found.end());
+  std::sort(indices.begin(), indices.end());
+}
+
+namespace {
+
+constexpr std::array<std::pair<int, int>, 8> kNeighborPixels{
+    {{-1, -1}, {0, -1}, {1, -1}, {-1, 0}, {1, 0}, {-1, 1}, {0, 1}, {1, 1}}};
+
+bool
+isInside(const PixelRange& range, int i)
+{
+  return i >= range.begin && i < range.end;
+}
+
+} // namespace
+
+void
+NeighborhoodSampler::Impl::geodesic(int seed,
+                                    Scratch& scratch,
+                                    std::vector<int>& indices) const
+{
+  if (grid)
+    gridGeodesic(seed, scratch, indices);
+  else
+    treeGeodesic(seed, scratch, indices);
+}
+
+void
+NeighborhoodSampler::Impl::gridGeodesic(int seed,
+                                        Scratch& scratch,
+                                        std::vector<int>& indices) const
+{
+  // No path is shorter than the straight line, so the window of the ball holds all.
+  const PixelWindow window = windowAround(seed);
+  const Camera& camera = grid->camera;
+  const int columns = window.columns.end - window.columns.begin;
+  const int rows = window.rows.end - window.rows.begin;
+  const JumpLimit limit = jumpLimit(seed);
+  const auto slotOf = [&](int u, int v) {
+    return (v - window.rows.begin) * columns + (u - window.columns.begin);
+  };
+  const auto indexOf = [&](int slot) {
+    return (slot / columns + window.rows.begin) * camera.width + slot % columns +
+           window.columns.begin;
+  };
+
+  PathSearch paths(scratch.heap,
+                   scratch.path_length,
+                   static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows),
+                   static_cast<float>(options.radius_m));
+  paths.reach(slotOf(seed % camera.width, seed / camera.width), 0.0F);
+  paths.run([&](int slot, float length) {
+    const int from = indexOf(slot);
+    for (const auto& [du, dv] : kNeighborPixels) {
+      const int u = from % camera.width + du;
+      const int v = from / camera.width + dv;
+      if (!isInside(window.columns, u) || !isInside(window.rows, v))
+        continue;
+      const float jump = std::abs(grid->row(v)[u] - grid->row(v - dv)[u - du]);
+      if (jump < limit.along(std::hypot(du / camera.fx, dv / camera.fy)))
+        paths.reach(slotOf(u, v), length + distance(from, v * camera.width + u));
+    }
+  });
+  for (int slot = 0; slot < columns * rows; ++slot)
+    if (paths.isReached(slot))
+      indices.push_back(indexOf(slot));
+}
+
+void
+NeighborhoodSampler::Impl::treeGeodesic(int seed,
+                                        Scratch& scratch,
+                                        std::vector<int>& indices) const
+{
+  constexpr int kNeighbors = 8;
+  std::vector<int>& within = scratch.ball;
+  treeBall(seed, scratch, within);
+  const auto slotOf = [&within](int index) {
+    const auto at = std::lower_bound(within.begin(), within.end(), index);
+    return at != within.end() && *at == index ? static_cast<int>(at - within.begin()) :
+                                                -1;
+  };
+
+  PathSearch paths(scratch.heap,
+                   scratch.path_length,
+                   within.size(),
+                   static_cast<float>(options.radius_m));
+  paths.reach(slotOf(seed), 0.0F);
+  paths.run([&](int slot, float length) {
+    const int from = within[static_cast<std::size_t>(slot)];
+    // One more, since the point itself is the nearest.
+    tree.nearestKSearch(points[from],
+                        kNeighbors + 1,
+                        scratch.found,
+                        scratch.squared_distances);
+    for (const int to : scratch.found)
+      if (const int next = slotOf(to); next >= 0)
+        paths.reach(next, length + distance(from, to));
+  });
+  for (int slot = 0; slot < static_cast<int>(within.size()); ++slot)
+    if (paths.isReached(slot))
+      indices.push_back(within[static_cast<std::size_t>(slot)]);
+}
+
+void
+NeighborhoodSampler::Impl::knn(int seed,
+                               Scratch& scratch,
+                               std::vector<int>& indices) const
+{
+  tree.nearestKSearch(points[seed],
+                      static_cast<unsigned>(options.k),
+                      scratch.found,
+                      scratch.squared_distances);
+  indices.assign(scratch.found.begin(), scratch.found.end());
+  // Among points at the same place the tree may choose others than the seed.
+  if (std::find(indices.begin(), indices.end(), seed) == indices.end())
+    indices.back() = seed;
+  std::sort(indices.begin(), indices.end());
+}
+
+std::vector<int>
+NeighborhoodSampler::Impl::gridSeeds(int max_seeds) const
+{
+  return grid ? pixelGridSeeds(*grid, options.spacing_m, max_seeds) :
+                voxelGridSeeds(points, validPoints(), options.spacing_m, max_seeds);
+}
+
+std::vector<int>
+NeighborhoodSampler::Impl::seeds() const
+{
+  switch (options.strategy) {
+  case SeedStrategy::Grid:
+    return gridSeeds(options.max_seeds);
+  case SeedStrategy::Random: {
+    const std::size_t count = options.max_seeds > 0 ?
+                                  static_cast<std::size_t>(options.max_seeds) :
+                                  gridSeeds(0).size();
+    return randomSeeds(validPoints(), count, options.random_seed);
+  }
+  case SeedStrategy::Poisson:
+    return poissonSeeds(points,
+                        validPoints(),
+                        options.spacing_m,
+                        options.max_seeds,
+                        options.random_seed);
+  }
+  return {};
+}
+
+std::string
+validityError(const SamplerOptions& options)
+{
+  if (!isPositive(options.radius_m))
+    return "the neighbourhood radius must be a positive number of metres";
+  if (options.k < 1)
+    return "a neighbourhood of nearest points needs at least one";
+  if (options.max_seeds < 0)
+    return "the number of seeds must not be negative";
+  if (!isPositive(options.spacing_m))
+    return "the seed spacing must be a positive number of metres";
+  if (!isNotNegative(options.jump_sigmas))
+    return "the depth jump must not be a negative number of sigmas";
+  if (!isNotNegative(options.max_slope))
+    return "the largest slope must not be negative";
+  return {};
+}
+
+NeighborhoodSampler::NeighborhoodSampler(const RangeCloud& cloud,
+                                         const Sensor& sensor,
+                                         const SamplerOptions& options)
+: impl_(std::make_unique<const Impl>(cloud, sensor, options))
+{}
+
+NeighborhoodSampler::~NeighborhoodSampler() = default;
+
+std::vector<int>
+NeighborhoodSampler::seeds() const
+{
+  return impl_->seeds();
+}
+
+NeighborhoodSampler::ScratchPtr
+NeighborhoodSampler::makeScratch() const
+{
+  return ScratchPtr(new Scratch);
+}
+
+void
+NeighborhoodSampler::neighborhood(int seed,
+                                  Scratch& scratch,
+                                  std::vector<int>& indices) const
+{
+  if (seed < 0 || seed >= static_cast<int>(impl_->points.size()))
+    throw std::invalid_argument("the cloud has no point " + std::to_string(seed));
+  indices.clear();
+  if (!impl_->isValid(seed))
+    return;
+  switch (impl_->options.neighborhood) {
+  case Neighborhood::Disc:
+    if (impl_->grid)
+      return impl_->disc(seed, scratch, indices);
+    return impl_->treeBall(seed, scratch, indices);
+  case Neighborhood::Ball:
+    return impl_->ball(seed, scratch, indices);
+  case Neighborhood::Geodesic:
+    return impl_->geodesic(seed, scratch, indices);
+  case Neighborhood::Knn:
+    return impl_->knn(seed, scratch, indices);
+  }
+}
+
+} // namespace holdfast

@@ -1,0 +1,211 @@
+#include "point_gatherer.h"
+
+#include <holdfast/geometry/gaussian.h>
+
+#include <pcl/common/point_tests.h>
+
+#include <limits>
+#include <utility>
+
+namespace holdfast {
+
+namespace {
+
+constexpr double kNoCovariance = std::numeric_limits<double>::quiet_NaN();
+
+bool
+isIdentity(const Pose& pose)
+{
+  return pose.R.isIdentity(0.0) && pose.c.isZero(0.0);
+}
+
+Eigen::Vector3d
+position(const RangeCloud& cloud, std::size_t index)
+{
+  return (*cloud.points)[index].getVector3fMap().cast<double>();
+}
+
+/// Models in which a pixel's noise depends on its neighbours look at the whole image.
+std::vector<Eigen::Matrix3f>
+imageCovariances(const RangeCloud& cloud, const NoiseModel& noise)
+{
+  const bool organized = cloud.points->height > 1;
+  if (!cloud.covariances.empty() || !organized || !noise.dependsOnNeighbors())
+    return {};
+  std::vector<Eigen::Vector3d> image;
+  image.reserve(cloud.points->size());
+  for (std::size_t i = 0; i < cloud.points->size(); ++i)
+    image.push_back(cloud.sensor_pose.toLocal(position(cloud, i)));
+  std::vector<Eigen::Matrix3f> covariances =
+      noise.imageCovariances(image,
+                             static_cast<int>(cloud.points->width),
+                             static_cast<int>(cloud.points->height));
+  const Eigen::Matrix3f R = cloud.sensor_pose.R.cast<float>();
+  for (Eigen::Matrix3f& S : covariances)
+    S = (R * S * R.transpose()).eval();
+  return covariances;
+}
+
+CovarianceChannels
+covarianceChannels(PointBatch& batch)
+{
+  return {batch.channel(PointBatch::SXX),
+          batch.channel(PointBatch::SXY),
+          batch.channel(PointBatch::SXZ),
+          batch.channel(PointBatch::SYY),
+          batch.channel(PointBatch::SYZ),
+          batch.channel(PointBatch::SZZ)};
+}
+
+/// Sigma <- R Sigma R^T for n points, in loops over channels.
+void
+rotate(const Eigen::Matrix3d& R, int n, const CovarianceChannels& s)
+{
+  const double r[3][3] = {{R(0, 0), R(0, 1), R(0, 2)},
+                          {R(1, 0), R(1, 1), R(1, 2)},
+                          {R(2, 0), R(2, 1), R(2, 2)}};
+  for (int i = 0; i < n; ++i) {
+    const double xx = s.xx[i], xy = s.xy[i], xz = s.xz[i];
+    const double yy = s.yy[i], yz = s.yz[i], zz = s.zz[i];
+    double a[3][3]; // R Sigma
+    for (int j = 0; j < 3; ++j) {
+      a[j][0] = r[j][0] * xx + r[j][1] * xy + r[j][2] * xz;
+      a[j][1] = r[j][0] * xy + r[j][1] * yy + r[j][2] * yz;
+      a[j][2] = r[j][0] * xz + r[j][1] * yz + r[j][2] * zz;
+    }
+    const auto entry = [&](int j, int k) {
+      return a[j][0] * r[k][0] + a[j][1] * r[k][1] + a[j][2] * r[k][2];
+    };
+    s.xx[i] = entry(0, 0);
+    s.xy[i] = entry(0, 1);
+    s.xz[i] = entry(0, 2);
+    s.yy[i] = entry(1, 1);
+    s.yz[i] = entry(1, 2);
+    s.zz[i] = entry(2, 2);
+  }
+}
+
+/// Most matrices are positive definite, which three minors show; the eigenvalues decide
+/// the rest.
+bool
+isCovariance(const Eigen::Matrix3d& S)
+{
+  if (!S.allFinite())
+    return false;
+  const double minor = S(0, 0) * S(1, 1) - S(0, 1) * S(1, 0);
+  return (S(0, 0) > 0.0 && minor > 0.0 && S.determinant() > 0.0 &&
+          S.isApprox(S.transpose())) ||
+         isPositiveSemiDefinite(S);
+}
+
+} // namespace
+
+PointGatherer::PointGatherer(const RangeCloud& cloud, NoiseModel::ConstPtr noise)
+: cloud_(cloud)
+, noise_(std::move(noise))
+, to_camera_(cloud.sensor_pose.inverse())
+, in_camera_frame_(isIdentity(cloud.sensor_pose))
+, image_covariances_(imageCovariances(cloud, *noise_))
+, stored_(cloud.covariances.empty() ? image_covariances_ : cloud.covariances)
+{}
+
+void
+PointGatherer::gather(const std::vector<int>& indices,
+                      const Eigen::Vector3d& origin,
+                      PointBatch& batch) const
+{
+  const int n = static_cast<int>(indices.size());
+  batch.clear(origin);
+  batch.resize(n);
+  if (stored_.empty())
+    gatherModelled(indices, batch);
+  else
+    gatherStored(indices, batch);
+  double* x = batch.channel(PointBatch::X);
+  double* y = batch.channel(PointBatch::Y);
+  double* z = batch.channel(PointBatch::Z);
+  for (int i = 0; i < n; ++i) {
+    const pcl::PointXYZ& p = (*cloud_.points)[indices[i]];
+    x[i] = p.x - origin.x();
+    y[i] = p.y - origin.y();
+    z[i] = p.z - origin.z();
+  }
+}
+
+void
+PointGatherer::gatherStored(const std::vector<int>& indices, PointBatch& batch) const
+{
+  const CovarianceChannels s = covarianceChannels(batch);
+  for (std::size_t i = 0; i < indices.size(); ++i) {
+    const Eigen::Matrix3f& S = stored_[static_cast<std::size_t>(indices[i])];
+    s.xx[i] = S(0, 0);
+    s.xy[i] = S(0, 1);
+    s.xz[i] = S(0, 2);
+    s.yy[i] = S(1, 1);
+    s.yz[i] = S(1, 2);
+    s.zz[i] = S(2, 2);
+  }
+}
+
+/// Leaves the coordinates in the camera frame, where the model wants them.
+void
+PointGatherer::gatherModelled(const std::vector<int>& indices, PointBatch& batch) const
+{
+  double* x = batch.channel(PointBatch::X);
+  double* y = batch.channel(PointBatch::Y);
+  double* z = batch.channel(PointBatch::Z);
+  for (std::size_t i = 0; i < indices.size(); ++i) {
+    const pcl::PointXYZ& p = (*cloud_.points)[indices[i]];
+    if (in_camera_frame_) {
+      x[i] = p.x;
+      y[i] = p.y;
+      z[i] = p.z;
+      continue;
+    }
+    const Eigen::Vector3d q = to_camera_.toWorld(p.getVector3fMap().cast<double>());
+    x[i] = q.x();
+    y[i] = q.y();
+    z[i] = q.z();
+  }
+  evaluateModel(batch);
+}
+
+void
+PointGatherer::evaluateModel(PointBatch& batch) const
+{
+  const int n = batch.size();
+  const double* z = batch.channel(PointBatch::Z);
+  const CovarianceChannels s = covarianceChannels(batch);
+  noise_->covariances(n,
+                      batch.channel(PointBatch::X),
+                      batch.channel(PointBatch::Y),
+                      z,
+                      s);
+  if (!noise_->isOmnidirectional())
+    for (int i = 0; i < n; ++i)
+      s.xx[i] = z[i] > 0.0 ? s.xx[i] : kNoCovariance;
+  if (!in_camera_frame_)
+    rotate(cloud_.sensor_pose.R, n, s);
+}
+
+bool
+PointGatherer::isUsable(int index) const
+{
+  const std::size_t i = static_cast<std::size_t>(index);
+  if (!stored_.empty())
+    return isCovariance(stored_[i].cast<double>());
+  const Eigen::Vector3d axis = cloud_.sensor_pose.R.col(2);
+  return noise_->isOmnidirectional() ||
+         axis.dot(position(cloud_, i) - cloud_.sensor_pose.c) > 0.0;
+}
+
+int
+PointGatherer::countInvalidCovariances() const
+{
+  int count = 0;
+  for (int i = 0; i < static_cast<int>(cloud_.points->size()); ++i)
+    count += pcl::isFinite((*cloud_.points)[i]) && !isUsable(i);
+  return count;
+}
+
+} // namespace holdfast

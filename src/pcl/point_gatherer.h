@@ -1,0 +1,43 @@
+/// \file From indices into a cloud to the points and covariances of a fit.
+#pragma once
+
+#include <holdfast/fit/point_batch.h>
+#include <holdfast/pcl/range_cloud.h>
+#include <holdfast/sensor/noise_model.h>
+
+#include <vector>
+
+namespace holdfast {
+
+/// Copies neighbourhoods into batches, covariances from the cloud if it has any, else
+/// from the noise model. Refers to the cloud. A point that the model has no covariance
+/// for gets NaN, which the fit leaves out and counts.
+class PointGatherer {
+public:
+  PointGatherer(const RangeCloud& cloud, NoiseModel::ConstPtr noise);
+
+  /// Refills the batch with finite points of the cloud; `origin` (frame of the cloud)
+  /// should be near them.
+  void gather(const std::vector<int>& indices,
+              const Eigen::Vector3d& origin,
+              PointBatch& batch) const;
+
+  /// How many finite points have no usable covariance.
+  int countInvalidCovariances() const;
+
+private:
+  void gatherStored(const std::vector<int>& indices, PointBatch& batch) const;
+  void gatherModelled(const std::vector<int>& indices, PointBatch& batch) const;
+  void evaluateModel(PointBatch& batch) const;
+  bool isUsable(int index) const;
+
+  const RangeCloud& cloud_;
+  NoiseModel::ConstPtr noise_;
+  Pose to_camera_;
+  bool in_camera_frame_;
+  std::vector<Eigen::Matrix3f> image_covariances_;
+  /// The cloud's, or those of the image, or empty: the model is asked point by point.
+  const std::vector<Eigen::Matrix3f>& stored_;
+};
+
+} // namespace holdfast

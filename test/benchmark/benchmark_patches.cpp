@@ -1,0 +1,276 @@
+/// \file What a patch costs, beside what it is built to replace.
+///
+/// All cases work on the same scene, one thread unless the name says otherwise; `us` is
+/// the time per patch (or normal), on the processor, on the wall where there are more
+/// threads; `points` is the true mean size of a neighbourhood.
+/// Trees are built, and neighbourhoods of fit_covariance and ceres_autodiff gathered,
+/// before the clock starts; whole_chain and pcl_normal include their search, and
+/// whole_chain its share of the frame's preparation (case frame_preparation).
+#include "ceres_paraboloid.h"
+#include "rough_cloud.h"
+
+#include <holdfast/pcl/patch_extraction.h>
+
+#include <pcl/features/normal_3d.h>
+#include <pcl/search/kdtree.h>
+#include <pcl/search/organized.h>
+
+#include <benchmark/benchmark.h>
+
+#include <chrono>
+#include <cstdio>
+#include <ctime>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace holdfast::benchmarks { namespace {
+
+const Scene&
+scene()
+{
+  static const Scene the_scene = makeScene();
+  return the_scene;
+}
+
+/// Radius of Disc or Ball for a mean size, found once.
+double
+cachedRadius(Neighborhood neighborhood, int points)
+{
+  static std::map<std::pair<Neighborhood, int>, double> radii;
+  const auto key = std::make_pair(neighborhood, points);
+  const auto known = radii.find(key);
+  if (known != radii.end())
+    return known->second;
+  return radii[key] = radiusFor(scene(), neighborhood, points);
+}
+
+SamplerOptions
+samplerOptions(Neighborhood neighborhood, int points)
+{
+  return makeSamplerOptions(neighborhood, cachedRadius(neighborhood, points));
+}
+
+enum class Clock { Processor, Wall };
+
+double
+now_us(Clock clock)
+{
+  if (clock == Clock::Processor)
+    return 1e6 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
+  const auto wall = std::chrono::steady_clock::now().time_since_epoch();
+  return std::chrono::duration<double, std::micro>(wall).count();
+}
+
+/// Runs round() until the benchmark has seen enough; a round does `patches` patches.
+template <typename Round>
+void
+measure(benchmark::State& state,
+        std::size_t patches,
+        Round&& round,
+        Clock clock = Clock::Processor)
+{
+  const double start = now_us(clock);
+  for ([[maybe_unused]] auto _ : state)
+    round();
+  const double elapsed = now_us(clock) - start;
+  const auto total = static_cast<double>(patches * state.iterations());
+  state.SetItemsProcessed(static_cast<std::int64_t>(total));
+  state.counters["us"] = elapsed / total;
+}
+
+void
+wholeChain(benchmark::State& state, int points, int threads)
+{
+  ExtractionOptions options;
+  options.sampler = samplerOptions(Neighborhood::Disc, points);
+  options.threads = threads;
+  const ExtractionResult once = extractPatches(scene().cloud, scene().sensor, options);
+  std::size_t seeds = once.patches.size();
+  for (const auto& rejected : once.rejected)
+    seeds += static_cast<std::size_t>(rejected.second);
+  measure(
+      state,
+      seeds,
+      [&] {
+        benchmark::DoNotOptimize(
+            extractPatches(scene().cloud, scene().sensor, options));
+      },
+      threads == 1 ? Clock::Processor : Clock::Wall);
+  state.counters["points"] = meanSize(scene(), options.sampler);
+  state.counters["usable"] =
+      static_cast<double>(once.patches.size()) / static_cast<double>(seeds);
+}
+
+void
+framePreparation(benchmark::State& state)
+{
+  const SamplerOptions options = samplerOptions(Neighborhood::Disc, 100);
+  measure(state, 1, [&] {
+    const NeighborhoodSampler sampler(scene().cloud, scene().sensor, options);
+    benchmark::DoNotOptimize(sampler.seeds());
+  });
+}
+
+void
+neighborhoods(benchmark::State& state, int points)
+{
+  const SamplerOptions options = samplerOptions(Neighborhood::Disc, points);
+  const NeighborhoodSampler sampler(scene().cloud, scene().sensor, options);
+  const auto scratch = sampler.makeScratch();
+  const std::vector<int> seeds = sampler.seeds();
+  std::vector<int> indices;
+  measure(state, seeds.size(), [&] {
+    for (const int seed : seeds) {
+      sampler.neighborhood(seed, *scratch, indices);
+      benchmark::DoNotOptimize(indices.data());
+    }
+  });
+  state.counters["points"] = meanSize(scene(), options);
+}
+
+void
+fitCovariance(benchmark::State& state, int points)
+{
+  const SamplerOptions options = samplerOptions(Neighborhood::Disc, points);
+  std::vector<PointBatch> batches = gatherBatches(scene(), options);
+  const PatchEstimator estimator{FitOptions{}};
+  double iterations = 0.0;
+  double curved = 0.0;
+  for (PointBatch& batch : batches) {
+    const FitResult fit = estimator.estimate(batch);
+    iterations += fit.iterations;
+    curved += fit.patch.type.surface != SurfaceType::Plane;
+  }
+  measure(state, batches.size(), [&] {
+    for (PointBatch& batch : batches)
+      benchmark::DoNotOptimize(estimator.estimate(batch));
+  });
+  const auto count = static_cast<double>(batches.size());
+  state.counters["points"] = meanSize(scene(), options);
+  state.counters["iterations"] = iterations / count;
+  state.counters["curved"] = curved / count;
+}
+
+template <typename Search>
+void
+pclNormal(benchmark::State& state, int points)
+{
+  // PCL searches balls: their radius is set for the same mean size.
+  const SamplerOptions options = samplerOptions(Neighborhood::Ball, points);
+  const NeighborhoodSampler sampler(scene().cloud, scene().sensor, options);
+  const auto search = pcl::make_shared<Search>();
+  search->setInputCloud(scene().cloud.points);
+  pcl::NormalEstimation<pcl::PointXYZ, pcl::Normal> estimation;
+  estimation.setInputCloud(scene().cloud.points);
+  estimation.setSearchMethod(search);
+  estimation.setRadiusSearch(options.radius_m);
+  const auto seeds = pcl::make_shared<pcl::Indices>(sampler.seeds());
+  estimation.setIndices(seeds);
+  pcl::PointCloud<pcl::Normal> normals;
+  measure(state, seeds->size(), [&] {
+    estimation.compute(normals);
+    benchmark::DoNotOptimize(normals.points.data());
+  });
+  state.counters["points"] = meanSize(scene(), options);
+}
+
+#ifdef HOLDFAST_HAVE_CERES
+void
+ceresAutodiff(benchmark::State& state, int points)
+{
+  const SamplerOptions options = samplerOptions(Neighborhood::Disc, points);
+  std::vector<PointBatch> batches = gatherBatches(scene(), options);
+  batches.resize(200); // slow: a few are enough
+  double converged = 0.0;
+  for (const PointBatch& batch : batches)
+    converged += fitWithCeres(batch).converged;
+  measure(state, batches.size(), [&] {
+    for (const PointBatch& batch : batches)
+      benchmark::DoNotOptimize(fitWithCeres(batch));
+  });
+  state.counters["points"] = meanSize(scene(), options);
+  state.counters["converged"] = converged / static_cast<double>(batches.size());
+}
+#endif
+
+void
+registerCases()
+{
+  const auto add = [](const std::string& name, auto&& run) {
+    benchmark::RegisterBenchmark(name.c_str(), run)->Unit(benchmark::kMillisecond);
+  };
+  for (const int n : {100, 400}) {
+    const std::string size = "/" + std::to_string(n);
+    add("whole_chain" + size, [n](benchmark::State& s) { wholeChain(s, n, 1); });
+    add("fit_covariance" + size, [n](benchmark::State& s) { fitCovariance(s, n); });
+    add("neighborhood" + size, [n](benchmark::State& s) { neighborhoods(s, n); });
+    add("pcl_normal_kdtree" + size, [n](benchmark::State& s) {
+      pclNormal<pcl::search::KdTree<pcl::PointXYZ>>(s, n);
+    });
+    add("pcl_normal_organized" + size, [n](benchmark::State& s) {
+      pclNormal<pcl::search::OrganizedNeighbor<pcl::PointXYZ>>(s, n);
+    });
+#ifdef HOLDFAST_HAVE_CERES
+    add("ceres_autodiff" + size, [n](benchmark::State& s) { ceresAutodiff(s, n); });
+#endif
+  }
+  add("whole_chain_threads/2", [](benchmark::State& s) { wholeChain(s, 100, 2); });
+  add("frame_preparation", framePreparation);
+}
+
+/// The usual table, and after it each time as a multiple of PCL's normal with a k-d
+/// tree on neighbourhoods of the same size.
+class RatioReporter : public benchmark::ConsoleReporter {
+public:
+  void ReportRuns(const std::vector<Run>& runs) override
+  {
+    ConsoleReporter::ReportRuns(runs);
+    for (const Run& run : runs)
+      if (const auto us = run.counters.find("us");
+          run.run_type == Run::RT_Iteration && us != run.counters.end())
+        times_us_.emplace_back(run.benchmark_name(), us->second.value);
+  }
+
+  void Finalize() override
+  {
+    std::printf("\n%-28s %12s %22s\n", "per patch", "us", "of pcl_normal_kdtree");
+    for (const auto& [name, us] : times_us_) {
+      const double reference = referenceFor(name);
+      if (reference > 0.0)
+        std::printf("%-28s %12.2f %21.2fx\n", name.c_str(), us, us / reference);
+    }
+  }
+
+private:
+  /// Time of PCL's normal at the size that the name ends in; 100 for the threads.
+  double referenceFor(const std::string& name) const
+  {
+    const std::string tail = name.substr(name.rfind('/') + 1);
+    const std::string size = tail == "400" ? "400" : "100";
+    if (name == "frame_preparation")
+      return 0.0;
+    for (const auto& [other, us] : times_us_)
+      if (other == "pcl_normal_kdtree/" + size)
+        return us;
+    return 0.0;
+  }
+
+  std::vector<std::pair<std::string, double>> times_us_;
+};
+
+}} // namespace holdfast::benchmarks
+
+int
+main(int argc, char** argv)
+{
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv))
+    return 1;
+  holdfast::benchmarks::registerCases();
+  holdfast::benchmarks::RatioReporter reporter;
+  benchmark::RunSpecifiedBenchmarks(&reporter);
+  benchmark::Shutdown();
+  return 0;
+}

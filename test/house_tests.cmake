@@ -1,0 +1,27 @@
+# The house itself: formatting, layers, set-up, and that the README's snippet is a sample.
+set(support ${CMAKE_CURRENT_SOURCE_DIR}/support)
+
+add_test(NAME format COMMAND ${support}/check_format.sh)
+set_tests_properties(format PROPERTIES SKIP_RETURN_CODE 77)
+
+add_test(NAME include_direction COMMAND ${support}/check_includes.sh)
+
+# A check that cannot fail is none: these two files break the rules.
+set(bad_tree ${scratch_dir}/bad_tree)
+file(WRITE ${bad_tree}/include/holdfast/fit/bad.h "#include <holdfast/sensor/camera.h>\n")
+file(WRITE ${bad_tree}/src/geometry/bad.cpp "#  include <pcl/point_types.h>\n")
+add_test(NAME include_direction_finds_violations
+  COMMAND ${support}/check_includes.sh ${bad_tree})
+set_tests_properties(include_direction_finds_violations PROPERTIES PASS_REGULAR_EXPRESSION
+  "fit must not include sensor.*must not include <pcl|must not include <pcl.*fit must not include sensor")
+
+add_test(NAME package_setup COMMAND ${support}/check_setup.sh)
+
+add_test(NAME readme_snippet COMMAND ${support}/check_readme.sh)
+
+if(HOLDFAST_BUILD_SAMPLES)
+  add_test(NAME sample_first_patch
+    COMMAND first_patch ${PROJECT_SOURCE_DIR}/samples/rocks.pcd)
+  set_tests_properties(sample_first_patch PROPERTIES PASS_REGULAR_EXPRESSION
+    "paraboloid  normal.*sigma")
+endif()

@@ -1,0 +1,60 @@
+#!/usr/bin/env bash
+# Includes point only upward in the list of layers below, so that the core can be read,
+# tested and used without PCL.
+#
+#   check_includes.sh [ROOT]     ROOT holds include/ and src/ (default: this project)
+set -euo pipefail
+cd "${1:-$(dirname "${BASH_SOURCE[0]}")/../..}"
+
+# Which layers each layer may include, itself aside. sensor and fit do not know each
+# other: the fit sees points and covariances, never where they came from.
+check='
+BEGIN {
+  allowed["geometry"] = ""
+  allowed["patch"] = "geometry"
+  allowed["sensor"] = "geometry patch"
+  allowed["fit"] = "geometry patch"
+  allowed["uncertainty"] = "geometry patch fit"
+  allowed["validation"] = "geometry patch fit uncertainty"
+  allowed["pcl"] = "geometry patch sensor fit uncertainty validation"
+  allowed["io"] = "geometry patch sensor fit uncertainty validation pcl"
+  # Beside C++ standard headers, which have neither slash nor dot. What a public header
+  # includes, every user of the core must have: only Eigen.
+  core_headers_may = "^(Eigen/|[a-z_0-9]+$)"
+  core_sources_may = "^(Eigen/|boost/math/|hwy/|[a-z_0-9]+$)"
+}
+function complain(why) {
+  printf "%s:%d: %s\n", FILENAME, FNR, why
+  bad = 1
+}
+function check_ours(header) {
+  target = header
+  sub(/\/.*/, "", target)
+  if (target in allowed && target != layer &&
+      index(" " allowed[layer] " ", " " target " ") == 0)
+    complain(layer " must not include " target)
+}
+function check_foreign(header) {
+  may = FILENAME ~ /^include/ ? core_headers_may : core_sources_may
+  if (layer != "pcl" && layer != "io" && header !~ may)
+    complain("the core must not include <" header ">")
+}
+FNR == 1 {
+  layer = FILENAME
+  sub(/^(include\/holdfast|src)\//, "", layer)
+  sub(/\/.*/, "", layer)
+  if (!(layer in allowed))
+    complain("unknown layer " layer)
+}
+/^[ \t]*#[ \t]*include[ \t]*["<]/ {
+  header = $0
+  sub(/^[^"<]*["<]/, "", header)
+  sub(/[">].*/, "", header)
+  if (sub(/^holdfast\//, "", header) || $0 ~ /include[ \t]*"/)
+    check_ours(header)
+  else
+    check_foreign(header)
+}
+END { exit bad }
+'
+find include/holdfast src -regex '.*\.\(h\|hpp\|inl\|cpp\)' -exec awk "$check" {} +

@@ -1,0 +1,163 @@
+/// \file Batches of noisy points on the patches of the calibration scenes.
+#pragma once
+
+#include "support/random.h"
+
+#include <holdfast/fit/options.h>
+#include <holdfast/fit/point_batch.h>
+#include <holdfast/patch/parameters.h>
+#include <holdfast/sensor/calibration_scenes.h>
+#include <holdfast/sensor/stereo_noise_model.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+namespace holdfast::test {
+
+/// Points with their covariances, world frame.
+struct Sample {
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Eigen::Matrix3d> covariances;
+  Eigen::Vector3d viewpoint = Eigen::Vector3d::Zero();
+};
+
+/// Fills a batch about the sample's first point.
+inline void
+fillBatch(const Sample& sample, PointBatch& batch)
+{
+  batch.clear(sample.points.empty() ? Eigen::Vector3d::Zero() : sample.points.front());
+  for (std::size_t i = 0; i < sample.points.size(); ++i)
+    batch.add(sample.points[i], sample.covariances[i]);
+}
+
+inline PointBatch
+batchOf(const Sample& sample)
+{
+  PointBatch batch;
+  fillBatch(sample, batch);
+  return batch;
+}
+
+/// The noise of the paper's Kinect.
+inline StereoNoiseModel
+kinectNoise()
+{
+  return StereoNoiseModel(StereoNoiseModel::Parameters{});
+}
+
+/// The points of a calibration scene that hit its patch, noise drawn once.
+inline Sample
+sampleScene(const CalibrationScene& scene,
+            double noise_scale,
+            std::mt19937_64& generator)
+{
+  RangeImage image = castRays(scene.scene, scene.rays);
+  attachNoise(image, kinectNoise());
+  Sample sample;
+  sample.viewpoint = image.sensor_pose.c;
+  std::vector<Eigen::Matrix3d> roots;
+  std::vector<Eigen::Vector3d> truth;
+  for (std::size_t i = 0; i < image.truth.size(); ++i)
+    if (image.hits[i] >= 0) {
+      truth.push_back(image.truth[i]);
+      roots.push_back(noise_scale * image.roots[i]);
+      sample.covariances.push_back(image.covariances[i]);
+    }
+  drawNoise(truth, roots, generator, sample.points);
+  return sample;
+}
+
+/// A robot scene from a distance of 0.8-1.2 m, any azimuth and a tilt of 0.2-0.8 rad.
+inline Sample
+robotSample(PatchType type, double noise_scale, Random& random)
+{
+  const double distance = random.uniform(0.8, 1.2);
+  const double tilt = random.uniform(0.2, 0.8);
+  const double azimuth = random.uniform(0.0, 6.28);
+  return sampleScene(robotScene(type, distance, tilt, azimuth),
+                     noise_scale,
+                     random.engine());
+}
+
+/// The sample seen from another frame: points T q, covariances R Sigma R^T.
+inline Sample
+transformed(const Sample& sample, const Pose& T)
+{
+  Sample moved = sample;
+  for (Eigen::Vector3d& point : moved.points)
+    point = T.toWorld(point);
+  for (Eigen::Matrix3d& covariance : moved.covariances)
+    covariance = (T.R * covariance * T.R.transpose()).eval();
+  moved.viewpoint = T.toWorld(sample.viewpoint);
+  return moved;
+}
+
+/// Bumps of some centimetres across that no patch can follow; the patches of the scenes
+/// lie in the xy plane.
+inline void
+addBumps(Sample& sample, double amplitude_m, double waves_per_m)
+{
+  const double w = 6.283 * waves_per_m;
+  for (Eigen::Vector3d& q : sample.points)
+    q.z() += amplitude_m * std::sin(w * q.x()) * std::cos(0.8 * w * q.y() + 1.0);
+}
+
+/// Largest |A_ij - B_ij| / sqrt(B_ii B_jj): the difference of two covariances in units
+/// of correlation.
+inline double
+normalizedDifference(const ParameterMatrix& A, const ParameterMatrix& B)
+{
+  double largest = 0.0;
+  for (int i = 0; i < B.rows(); ++i)
+    for (int j = 0; j < B.cols(); ++j) {
+      const double difference =
+          std::abs(A(i, j) - B(i, j)) / std::sqrt(B(i, i) * B(j, j));
+      // Written so that NaN comes through.
+      if (!(difference <= largest))
+        largest = difference;
+    }
+  return largest;
+}
+
+/// The request that forces a type, so that no test decides.
+inline SurfaceRequest
+requestFor(SurfaceType surface)
+{
+  switch (surface) {
+  case SurfaceType::Plane:
+    return SurfaceRequest::Plane;
+  case SurfaceType::Sphere:
+    return SurfaceRequest::Sphere;
+  case SurfaceType::CircularCylinder:
+    return SurfaceRequest::CircularCylinder;
+  case SurfaceType::EllipticParaboloid:
+    return SurfaceRequest::EllipticParaboloid;
+  case SurfaceType::HyperbolicParaboloid:
+    return SurfaceRequest::HyperbolicParaboloid;
+  case SurfaceType::CylindricParaboloid:
+    return SurfaceRequest::CylindricParaboloid;
+  case SurfaceType::CircularParaboloid:
+    break;
+  }
+  return SurfaceRequest::CircularParaboloid;
+}
+
+inline FitOptions
+optionsFor(PatchType type, FitOptions options = {})
+{
+  options.surface = requestFor(type.surface);
+  if (type.surface == SurfaceType::Plane)
+    options.plane_boundary = type.boundary;
+  return options;
+}
+
+inline std::string
+typeName(PatchType type)
+{
+  return std::string(surfaceName(type.surface)) + "_" +
+         std::string(boundaryName(type.boundary));
+}
+
+} // namespace holdfast::test

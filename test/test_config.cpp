@@ -1,0 +1,247 @@
+#include <holdfast/io/config.h>
+#include <holdfast/sensor/stereo_noise_model.h>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace holdfast { namespace {
+
+namespace fs = std::filesystem;
+
+const std::string kGood = "name: mine\n" // 1
+                          "camera:\n" // 2
+                          "  width: 320\n" // 3
+                          "  height: 240\n" // 4
+                          "  fx: 300.5\n" // 5
+                          "  fy: 301\n" // 6
+                          "  cx: 159.5\n" // 7
+                          "  cy: 119.5\n" // 8
+                          "range:\n" // 9
+                          "  min_m: 0.4\n" // 10
+                          "  max_m: 5\n" // 11
+                          "disparity:\n" // 12
+                          "  baseline_m: 0.06\n" // 13
+                          "  focal_px: 310\n" // 14
+                          "  quantum_px: 0.25\n" // 15
+                          "noise:\n" // 16
+                          "  model: stereo\n" // 17
+                          "  sigma_point_px: 0.3\n" // 18
+                          "  sigma_disparity_px: 0.2\n"; // 19
+
+class SensorFile : public testing::Test {
+protected:
+  SensorFile()
+  : folder_(fs::path(HOLDFAST_SCRATCH_DIR) /
+            (std::string("config_") +
+             testing::UnitTest::GetInstance()->current_test_info()->name()))
+  , file_((folder_ / "sensor.yaml").string())
+  {
+    fs::create_directories(folder_);
+  }
+
+  ~SensorFile() override
+  {
+    fs::remove_all(folder_);
+  }
+
+  void write(const std::string& text) const
+  {
+    std::ofstream(file_) << text;
+  }
+
+  /// The good file with one piece replaced.
+  void writeChanged(const std::string& piece, const std::string& by) const
+  {
+    std::string text = kGood;
+    ASSERT_NE(text.find(piece), std::string::npos) << piece;
+    write(text.replace(text.find(piece), piece.size(), by));
+  }
+
+  /// What loading it complains about, without the file's name in front.
+  std::string complaint() const
+  {
+    try {
+      loadSensor(file_);
+    }
+    catch (const std::runtime_error& error) {
+      const std::string message = error.what();
+      EXPECT_EQ(message.rfind(file_ + ":", 0), 0u) << message;
+      EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+      return message.substr(std::min(message.size(), file_.size() + 1));
+    }
+    return "";
+  }
+
+  fs::path folder_;
+  std::string file_;
+};
+
+TEST_F(SensorFile, EveryValueArrives)
+{
+  write(kGood);
+  const Sensor sensor = loadSensor(file_);
+  EXPECT_EQ(sensor.name, "mine");
+  EXPECT_EQ(sensor.camera.width, 320);
+  EXPECT_EQ(sensor.camera.height, 240);
+  EXPECT_EQ(sensor.camera.fx, 300.5);
+  EXPECT_EQ(sensor.camera.fy, 301.0);
+  EXPECT_EQ(sensor.camera.cx, 159.5);
+  EXPECT_EQ(sensor.camera.cy, 119.5);
+  EXPECT_EQ(sensor.min_range_m, 0.4);
+  EXPECT_EQ(sensor.max_range_m, 5.0);
+  EXPECT_EQ(sensor.baseline_m, 0.06);
+  EXPECT_EQ(sensor.disparity_focal_px, 310.0);
+  EXPECT_EQ(sensor.disparity_quantum_px, 0.25);
+  const auto stereo = std::dynamic_pointer_cast<const StereoNoiseModel>(sensor.noise);
+  ASSERT_NE(stereo, nullptr);
+  EXPECT_EQ(stereo->parameters().sigma_point_px, 0.3);
+  EXPECT_EQ(stereo->parameters().sigma_disparity_px, 0.2);
+  EXPECT_EQ(stereo->parameters().baseline_m, 0.06) << "from disparity";
+  EXPECT_EQ(stereo->parameters().focal_px, 310.0) << "from disparity";
+}
+
+TEST_F(SensorFile, TheNoiseMayHaveItsOwnFocalLength)
+{
+  write(kGood + "  focal_px: 320\n");
+  const auto stereo =
+      std::dynamic_pointer_cast<const StereoNoiseModel>(loadSensor(file_).noise);
+  ASSERT_NE(stereo, nullptr);
+  EXPECT_EQ(stereo->parameters().focal_px, 320.0);
+}
+
+TEST_F(SensorFile, ErrorsNameLineAndKey)
+{
+  struct Case {
+    std::string piece, by, message;
+  };
+  const std::vector<Case> cases{
+      {"name: mine\n", "", "1: name is missing"},
+      {"  fx: 300.5\n", "", "2: camera.fx is missing"},
+      {"  sigma_point_px: 0.3\n", "", "16: noise.sigma_point_px is missing"},
+      {"  baseline_m: 0.06\n", "", "12: disparity.baseline_m is missing"},
+      {"  cy: 119.5\n", "  cy: 119.5\n  k1: 0.1\n", "9: camera.k1 is not a known key"},
+      {"range:\n", "colour: red\nrange:\n", "9: colour is not a known key"},
+      {"  max_m: 5\n", "  max_m: 5\n  max_m: 6\n", "12: range.max_m is given twice"},
+      {"noise:\n", "noise:\n  sigma_m: 1\n", "17: noise.sigma_m is not a known key"},
+      {"fx: 300.5", "fx: wide", "5: camera.fx must be a finite number"},
+      {"fx: 300.5", "fx: [1, 2]", "5: camera.fx must be a finite number"},
+      {"fx: 300.5", "fx:", "5: camera.fx must be a finite number"},
+      {"fx: 300.5", "fx: .nan", "5: camera.fx must be a finite number"},
+      {"cx: 159.5", "cx: .inf", "7: camera.cx must be a finite number"},
+      {"fx: 300.5", "fx: -300.5", "5: camera.fx must be > 0"},
+      {"width: 320", "width: 0", "3: camera.width must be a whole number from 1 to "},
+      {"width: 320", "width: 3.5", "3: camera.width must be a whole number from 1 to "},
+      {"height: 240", "height: 1e9", "4: camera.height must be a whole number from 1"},
+      {"min_m: 0.4", "min_m: -1", "10: range.min_m must be >= 0"},
+      {"max_m: 5", "max_m: 0.4", "11: range.max_m must be larger than min_m"},
+      {"focal_px: 310", "focal_px: 0", "14: disparity.focal_px must be > 0"},
+      {"quantum_px: 0.25", "quantum_px: 0", "15: disparity.quantum_px must be > 0"},
+      {"model: stereo", "model: magic", "17: noise.model names no noise model: magic"},
+      {"model: stereo", "model: [a]", "17: noise.model must be a word"},
+      {"sigma_point_px: 0.3",
+       "sigma_point_px: -0.3",
+       "18: noise.sigma_point_px must be a finite number >= 0"},
+      {"name: mine", "name:", "1: name must be a word"},
+  };
+  for (const Case& c : cases) {
+    SCOPED_TRACE(c.piece + " -> " + c.by);
+    writeChanged(c.piece, c.by);
+    const std::string message = complaint();
+    EXPECT_EQ(message.rfind(c.message, 0), 0u) << message;
+  }
+}
+
+TEST_F(SensorFile, SectionsMustBeMaps)
+{
+  write("");
+  EXPECT_EQ(complaint(), "1: file must be a list of `key: value`");
+  write("just words\n");
+  EXPECT_EQ(complaint(), "1: file must be a list of `key: value`");
+  write("name: a\ncamera: 5\n");
+  EXPECT_EQ(complaint(), "2: camera must be a list of `key: value`");
+  write("name: a\n[1, 2]: 5\n");
+  EXPECT_NE(complaint(), "");
+}
+
+TEST_F(SensorFile, BrokenYamlNamesTheLine)
+{
+  write("name: a\ncamera: {width: 3\n");
+  EXPECT_NE(complaint(), "");
+  write("name: a\n\tcamera: 5\n");
+  EXPECT_EQ(complaint().rfind("2: ", 0), 0u) << complaint();
+}
+
+TEST(BuiltInSensors, AllLoadUnderTheirNames)
+{
+  const std::vector<std::string> names = listSensors();
+  EXPECT_TRUE(std::is_sorted(names.begin(), names.end()));
+  for (const std::string name : {"kinect_v1", "xtion", "realsense_d435", "perfect"})
+    EXPECT_EQ(std::count(names.begin(), names.end(), name), 1) << name;
+  for (const std::string& name : names) {
+    const Sensor sensor = loadSensor(name);
+    EXPECT_EQ(sensor.name, name);
+    ASSERT_NE(sensor.noise, nullptr);
+    EXPECT_TRUE(sensor.noise->covariance({0.1, 0.2, 1.0}).allFinite());
+  }
+}
+
+TEST(BuiltInSensors, CarryThePublishedNumbers)
+{
+  const Sensor kinect = loadSensor("kinect_v1");
+  EXPECT_EQ(kinect.camera.fx, 575.8);
+  EXPECT_EQ(kinect.baseline_m, 0.075);
+  EXPECT_EQ(kinect.disparity_quantum_px, 0.125);
+  EXPECT_EQ(loadSensor("xtion").camera.fx, 525.0);
+  EXPECT_TRUE(loadSensor("perfect").noise->covariance({1, 1, 3}).isZero(0.0));
+  const Sensor d435 = loadSensor("realsense_d435");
+  // Half of 848 px at 43.5 degrees, given with one decimal.
+  EXPECT_NEAR(d435.camera.fx, 424.0 / std::tan(43.5 * std::acos(-1.0) / 180.0), 0.05);
+  // z^2 subpixel / (f b) at 2 m.
+  EXPECT_NEAR(std::sqrt(d435.noise->covariance({0, 0, 2})(2, 2)),
+              4.0 * 0.08 / (446.8 * 0.05),
+              1e-15);
+}
+
+TEST(BuiltInSensors, AnUnknownNameListsTheKnown)
+{
+  try {
+    loadSensor("kinekt");
+    FAIL() << "found";
+  }
+  catch (const std::runtime_error& error) {
+    const std::string message = error.what();
+    EXPECT_EQ(message.rfind("sensor kinekt: ", 0), 0u) << message;
+    EXPECT_NE(message.find("kinect_v1"), std::string::npos) << message;
+  }
+  EXPECT_THROW(loadSensor(""), std::runtime_error);
+  EXPECT_THROW(loadSensor("../sensors/kinect_v1"), std::runtime_error);
+  EXPECT_THROW(loadSensor(HOLDFAST_SCRATCH_DIR), std::runtime_error);
+}
+
+TEST_F(SensorFile, FolderOfTheEnvironmentComesFirst)
+{
+  fs::create_directories(folder_ / "sensors");
+  std::string text = kGood;
+  text.replace(text.find("mine"), 4, "special");
+  std::ofstream(folder_ / "sensors" / "kinect_v1.yaml") << text;
+  std::ofstream(folder_ / "sensors" / "of_my_own.yaml") << text;
+  ASSERT_EQ(setenv("HOLDFAST_CONFIG_DIR", folder_.c_str(), 1), 0);
+  EXPECT_EQ(loadSensor("kinect_v1").name, "special");
+  EXPECT_EQ(loadSensor("of_my_own").name, "special");
+  EXPECT_EQ(loadSensor("xtion").name, "xtion") << "still found where it was";
+  const std::vector<std::string> names = listSensors();
+  EXPECT_EQ(std::count(names.begin(), names.end(), "of_my_own"), 1);
+  EXPECT_EQ(std::count(names.begin(), names.end(), "kinect_v1"), 1);
+  unsetenv("HOLDFAST_CONFIG_DIR");
+}
+
+}} // namespace holdfast

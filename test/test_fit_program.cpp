@@ -1,0 +1,212 @@
+#include <holdfast/io/cloud_io.h>
+#include <holdfast/io/patch_io.h>
+#include <holdfast/patch/surface.h>
+
+#include "support/run_program.h"
+#include "support/small_clouds.h"
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <cmath>
+#include <sstream>
+
+namespace holdfast { namespace {
+
+using test::freshFolder;
+using test::runProgram;
+using Json = nlohmann::json;
+
+/// The tests' clouds have their own small camera, so covariances come with them.
+std::string
+saveBowl(const std::string& folder, const std::string& name)
+{
+  saveCloud(folder + "/" + name, test::bowlCloud(40, 30, test::tiltedPose(), true));
+  return folder + "/" + name;
+}
+
+std::vector<Json>
+jsonLines(const std::string& text)
+{
+  std::vector<Json> objects;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);)
+    objects.push_back(Json::parse(line));
+  return objects;
+}
+
+TEST(FitProgram, JsonOnStandardOutputIsPure)
+{
+  const std::string folder = freshFolder("fit_json");
+  const auto run =
+      runProgram(folder, {"fit", saveBowl(folder, "bowl.pcd"), "--json", "-"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const Json json = Json::parse(run.out);
+  EXPECT_EQ(json["cloud"], folder + "/bowl.pcd");
+  ASSERT_GT(json["patches"].size(), 10U);
+  for (const auto& patch : json["patches"]) {
+    const std::size_t dof = patch["dof"];
+    EXPECT_EQ(patch["names"].size(), dof);
+    EXPECT_EQ(patch["parameters"].size(), dof);
+    EXPECT_EQ(patch["covariance"].size(), dof);
+    EXPECT_EQ(patch["seed"]["point"].size(), 3U);
+    EXPECT_EQ(patch["radius"], 0.05);
+  }
+  EXPECT_EQ(test::filesIn(folder), std::vector<std::string>{"bowl.pcd"});
+}
+
+TEST(FitProgram, WholeFindsTheBowl)
+{
+  const std::string folder = freshFolder("fit_whole");
+  const std::string cloud = saveBowl(folder, "bowl.pcd");
+  const auto run = runProgram(folder, {"fit", cloud, "--whole", "--json", "-"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const PatchReport report = readJson(run.out);
+  ASSERT_EQ(report.result.patches.size(), 1U);
+  const FitResult& fit = report.result.patches[0].fit;
+  EXPECT_EQ(fit.points, 40 * 30 - 1);
+  EXPECT_FALSE(report.result.patches[0].seed_index.has_value());
+  EXPECT_EQ(fit.patch.type.surface, SurfaceType::EllipticParaboloid);
+  // A ripple of 1 mm over 0.25 m bends by 0.03 per metre; ten times that.
+  EXPECT_NEAR(fit.patch.kappa.x(), 2.0, 0.3);
+  EXPECT_NEAR(fit.patch.kappa.y(), 4.0, 0.3);
+  // The normal points back at the sensor.
+  EXPECT_GT(fit.patch.normal().dot(test::tiltedPose().c - fit.patch.c), 0.0);
+}
+
+TEST(FitProgram, FolderWritesJsonAndMeshOfEveryCloud)
+{
+  const std::string folder = freshFolder("fit_folder");
+  const std::string out = folder + "/out/deep";
+  saveBowl(folder, "b.pcd");
+  saveBowl(folder, "a.pcd");
+  test::writeFile(folder + "/old.patches.ply", "not to be read");
+  test::writeFile(folder + "/notes.txt", "not a cloud");
+  const auto run = runProgram(folder, {"fit", folder, "-o", out, "--threads", "2"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(test::filesIn(out),
+            (std::vector<std::string>{"a.patches.json",
+                                      "a.patches.ply",
+                                      "b.patches.json",
+                                      "b.patches.ply"}));
+  const PatchReport report = readJson(test::readFile(out + "/a.patches.json"));
+  EXPECT_GT(report.result.patches.size(), 10U);
+  EXPECT_EQ(test::readFile(out + "/a.patches.ply").substr(0, 4), "ply\n");
+  EXPECT_LT(run.out.find("a.pcd: "), run.out.find("b.pcd: ")); // sorted, in the table
+}
+
+TEST(FitProgram, OneJsonObjectPerLineForSeveralClouds)
+{
+  const std::string folder = freshFolder("fit_json_lines");
+  const std::vector<std::string> arguments{"fit",
+                                           saveBowl(folder, "one.pcd"),
+                                           saveBowl(folder, "two.pcd"),
+                                           "--json"};
+  auto to_output = arguments;
+  to_output.emplace_back("-");
+  const auto lines = jsonLines(runProgram(folder, to_output).out);
+  ASSERT_EQ(lines.size(), 2U);
+  EXPECT_EQ(lines[1]["cloud"], folder + "/two.pcd");
+  auto to_file = arguments;
+  to_file.push_back(folder + "/patches.json");
+  EXPECT_EQ(runProgram(folder, to_file).exit_code, 0);
+  EXPECT_EQ(jsonLines(test::readFile(folder + "/patches.json")).size(), 2U);
+}
+
+TEST(FitProgram, TableAndQuiet)
+{
+  const std::string folder = freshFolder("fit_table");
+  const std::string cloud = saveBowl(folder, "bowl.pcd");
+  const auto table = runProgram(folder, {"fit", cloud});
+  EXPECT_EQ(table.exit_code, 0);
+  EXPECT_NE(table.out.find("chi2/dof"), std::string::npos);
+  EXPECT_NE(table.out.find("paraboloid"), std::string::npos);
+  EXPECT_NE(table.err.find("note: "), std::string::npos); // other intrinsics
+  const auto quiet = runProgram(folder, {"fit", cloud, "--quiet"});
+  EXPECT_EQ(quiet.exit_code, 0);
+  EXPECT_EQ(quiet.out, "");
+  EXPECT_EQ(quiet.err, "");
+}
+
+TEST(FitProgram, ThreadsDoNotChangeTheResult)
+{
+  const std::string folder = freshFolder("fit_threads");
+  const std::string cloud = saveBowl(folder, "bowl.pcd");
+  std::string first;
+  for (const std::string threads : {"1", "2", "5"}) {
+    Json json = Json::parse(
+        runProgram(folder, {"fit", cloud, "--json", "-", "--threads", threads}).out);
+    const std::string patches = json["patches"].dump();
+    if (first.empty())
+      first = patches;
+    EXPECT_EQ(patches, first) << threads;
+  }
+}
+
+TEST(FitProgram, OptionsReachTheFit)
+{
+  const std::string folder = freshFolder("fit_options");
+  const std::string cloud = saveBowl(folder, "bowl.pcd");
+  const auto fit = [&](std::vector<std::string> options) {
+    options.insert(options.begin(), {"fit", cloud, "--json", "-"});
+    const auto run = runProgram(folder, options);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return Json::parse(run.out);
+  };
+  const Json planes = fit({"--surface", "plane", "--boundary", "quad"});
+  EXPECT_EQ(planes["patches"][0]["surface"], "plane");
+  EXPECT_EQ(planes["patches"][0]["boundary"], "quad");
+  EXPECT_LE(fit({"--seeds", "5"})["patches"].size(), 5U);
+  EXPECT_EQ(fit({"--radius", "0.07"})["patches"][0]["radius"], 0.07);
+  const Json knn = fit({"--neighborhood", "knn", "--k", "50"});
+  EXPECT_EQ(knn["patches"][0]["points"], 50);
+  EXPECT_GT(fit({"--spacing", "0.02"})["patches"].size(),
+            fit({"--spacing", "0.06"})["patches"].size());
+  EXPECT_EQ(fit({"--covariance", "gauss-newton"})["patches"][0]["covariance_mode"],
+            "gauss_newton");
+  const Json paper = fit({"--paper", "--containment", "0.9"});
+  EXPECT_EQ(paper["options"]["debias_scatter"], false);
+  EXPECT_EQ(paper["options"]["containment"], 0.9);
+  const auto random = [&](const std::string& seed) {
+    return fit({"--seed-strategy",
+                "random",
+                "--seeds",
+                "6",
+                "--random-seed",
+                seed})["patches"][0]["seed"]["index"];
+  };
+  EXPECT_EQ(random("3"), random("3"));
+  EXPECT_NE(random("3"), random("4"));
+}
+
+TEST(FitProgram, DepthImage)
+{
+  const std::string folder = freshFolder("fit_depth");
+  test::writeFile(folder + "/depth.pgm", test::pgmBytes(test::bowlCloud(40, 30), 1000));
+  const auto run = runProgram(folder, {"fit", folder + "/depth.pgm", "--json", "-"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(run.err.find("intrinsics scaled from 640 to 40"), std::string::npos)
+      << run.err;
+  EXPECT_GT(Json::parse(run.out)["patches"].size(), 1U);
+}
+
+TEST(FitProgram, RecordedCloudsRunClean)
+{
+  const std::string folder = freshFolder("fit_recorded");
+  for (const std::string name : {"gpd_krylon_can.pcd",
+                                 "mosd_cyl_learn44.pcd",
+                                 "pcl_milk_clorox_carpet.pcd",
+                                 "pcl_table_mug_stereo.pcd",
+                                 "rosind_table_boxes.pcd"}) {
+    const std::string path = test::recordedCloud(name);
+    if (path.empty())
+      GTEST_SKIP() << "no recorded clouds: set HOLDFAST_DATA_DIR";
+    const auto run =
+        runProgram(folder,
+                   {"fit", path, "--seeds", "300", "--radius", "0.02", "--json", "-"});
+    EXPECT_EQ(run.exit_code, 0) << name << run.err;
+    EXPECT_GT(Json::parse(run.out)["patches"].size(), 10U) << name;
+  }
+}
+
+}} // namespace holdfast

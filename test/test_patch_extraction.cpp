@@ -1,0 +1,417 @@
+#include "support/organized_cloud.h"
+#include "support/random.h"
+
+#include <holdfast/pcl/patch_extraction.h>
+#include <holdfast/sensor/constant_noise_model.h>
+#include <holdfast/sensor/dryanovski_noise_model.h>
+
+#include <algorithm>
+#include <cstring>
+#include <stdexcept>
+
+namespace holdfast { namespace {
+
+using test::makeCamera;
+using test::makeOrganizedCloud;
+using test::makeSensor;
+using test::Random;
+
+const Camera kCamera = makeCamera(160, 120, 150.0);
+
+double
+rollingDepth(double u, double v)
+{
+  return 1.0 + 0.1 * std::sin(0.06 * u) * std::cos(0.05 * v);
+}
+
+/// Rolling ground with the depth noise of the sensor and some holes.
+RangeCloud
+makeRollingCloud(Random& random, const Pose& pose = {})
+{
+  return makeOrganizedCloud(
+      kCamera,
+      [&random](int u, int v) {
+        if (random.uniform(0.0, 1.0) < 0.02)
+          return std::nan("");
+        return rollingDepth(u, v) + 0.003 * random.normal();
+      },
+      pose);
+}
+
+Pose
+randomPose(Random& random)
+{
+  return {random.rotation(), random.uniformVector(-1.0, 1.0)};
+}
+
+ExtractionOptions
+makeOptions(double radius = 0.08, double spacing = 0.1)
+{
+  ExtractionOptions options;
+  options.sampler.radius_m = radius;
+  options.sampler.spacing_m = spacing;
+  options.threads = 1;
+  return options;
+}
+
+template <typename Derived>
+bool
+sameBits(const Eigen::PlainObjectBase<Derived>& a,
+         const Eigen::PlainObjectBase<Derived>& b)
+{
+  using Scalar = typename Derived::Scalar;
+  return a.rows() == b.rows() && a.cols() == b.cols() &&
+         std::memcmp(a.data(),
+                     b.data(),
+                     sizeof(Scalar) * static_cast<std::size_t>(a.size())) == 0;
+}
+
+void
+expectSameBits(const ExtractionResult& a, const ExtractionResult& b)
+{
+  EXPECT_EQ(a.rejected, b.rejected);
+  EXPECT_EQ(a.invalid_covariances, b.invalid_covariances);
+  EXPECT_EQ(a.notices, b.notices);
+  ASSERT_EQ(a.patches.size(), b.patches.size());
+  for (std::size_t i = 0; i < a.patches.size(); ++i) {
+    const ExtractedPatch& p = a.patches[i];
+    const ExtractedPatch& q = b.patches[i];
+    EXPECT_EQ(p.seed_index, q.seed_index);
+    EXPECT_EQ(p.fit.status, q.fit.status);
+    EXPECT_EQ(p.fit.iterations, q.fit.iterations);
+    EXPECT_TRUE(p.fit.patch.type == q.fit.patch.type);
+    EXPECT_TRUE(sameBits(pack(p.fit.patch), pack(q.fit.patch)));
+    EXPECT_TRUE(sameBits(p.fit.covariance, q.fit.covariance));
+    EXPECT_EQ(std::memcmp(&p.fit.chi2, &q.fit.chi2, sizeof(double)), 0);
+  }
+}
+
+/// Largest difference of two covariances of the same parameters, each in units of its
+/// sigmas.
+double
+normalizedDifference(const ParameterMatrix& a, const ParameterMatrix& b)
+{
+  double worst = 0.0;
+  for (Eigen::Index i = 0; i < a.rows(); ++i)
+    for (Eigen::Index j = 0; j < a.cols(); ++j)
+      worst =
+          std::max(worst, std::abs(a(i, j) - b(i, j)) / std::sqrt(a(i, i) * a(j, j)));
+  return worst;
+}
+
+void
+expectSimilar(const FitResult& a, const FitResult& b, double tolerance_sigma)
+{
+  ASSERT_EQ(a.status, b.status);
+  ASSERT_TRUE(a.patch.type == b.patch.type);
+  EXPECT_EQ(a.points, b.points);
+  const ParameterVector difference = pack(a.patch) - pack(b.patch);
+  for (Eigen::Index i = 0; i < difference.size(); ++i)
+    EXPECT_LE(std::abs(difference[i]), tolerance_sigma * std::sqrt(a.covariance(i, i)));
+  EXPECT_LE(normalizedDifference(a.covariance, b.covariance), tolerance_sigma);
+}
+
+TEST(ExtractPatches, DoesNotDependOnTheNumberOfThreads)
+{
+  Random random;
+  const RangeCloud cloud = makeRollingCloud(random, randomPose(random));
+  ExtractionOptions options = makeOptions();
+  options.sampler.strategy = SeedStrategy::Poisson;
+  const ExtractionResult serial = extractPatches(cloud, makeSensor(kCamera), options);
+  EXPECT_GT(serial.patches.size(), 50U);
+  for (const int threads : {0, 2, 3, 7}) {
+    options.threads = threads;
+    expectSameBits(serial, extractPatches(cloud, makeSensor(kCamera), options));
+  }
+}
+
+TEST(ExtractPatches, IsNeighborhoodThenCovariancesThenFit)
+{
+  Random random;
+  const Pose pose = randomPose(random);
+  const RangeCloud cloud = makeRollingCloud(random, pose);
+  const Sensor sensor = makeSensor(kCamera);
+  const ExtractionOptions options = makeOptions(0.08, 0.25);
+  const ExtractionResult result = extractPatches(cloud, sensor, options);
+  ASSERT_GT(result.patches.size(), 5U);
+
+  const NeighborhoodSampler sampler(cloud, sensor, options.sampler);
+  const auto scratch = sampler.makeScratch();
+  FitOptions fit = options.fit;
+  fit.viewpoint = pose.c;
+  for (const ExtractedPatch& extracted : result.patches) {
+    std::vector<int> indices;
+    sampler.neighborhood(*extracted.seed_index, *scratch, indices);
+    PointBatch batch;
+    batch.clear(extracted.seed);
+    for (const int i : indices) {
+      const Eigen::Vector3d p = (*cloud.points)[i].getVector3fMap().cast<double>();
+      const Eigen::Matrix3d S = sensor.noise->covariance(pose.toLocal(p));
+      batch.add(p, pose.R * S * pose.R.transpose());
+    }
+    // The sums of three products in another order, and an ill-conditioned fit.
+    expectSimilar(estimatePatch(batch, fit, options.covariance), extracted.fit, 1e-6);
+    EXPECT_EQ(extracted.radius_m, options.sampler.radius_m);
+  }
+}
+
+TEST(ExtractPatches, NormalsPointToTheSensor)
+{
+  Random random;
+  const Pose pose = randomPose(random);
+  const ExtractionResult result = extractPatches(makeRollingCloud(random, pose),
+                                                 makeSensor(kCamera),
+                                                 makeOptions());
+  ASSERT_FALSE(result.patches.empty());
+  for (const ExtractedPatch& p : result.patches)
+    EXPECT_GT(p.fit.patch.normal().dot(pose.c - p.fit.patch.c), 0.0);
+}
+
+TEST(ExtractPatches, KeepsTheOrderOfTheSeedsAndCountsTheRest)
+{
+  Random random;
+  const RangeCloud cloud = makeRollingCloud(random);
+  ExtractionOptions options = makeOptions();
+  options.sampler.strategy = SeedStrategy::Random;
+  options.sampler.max_seeds = 150;
+  options.sampler.radius_m = 0.015; // few points: some fits fail
+  const std::vector<int> seeds =
+      NeighborhoodSampler(cloud, makeSensor(kCamera), options.sampler).seeds();
+  const ExtractionResult result = extractPatches(cloud, makeSensor(kCamera), options);
+  std::size_t rejected = 0;
+  for (const auto& [status, count] : result.rejected) {
+    EXPECT_FALSE(isUsable(status));
+    rejected += static_cast<std::size_t>(count);
+  }
+  EXPECT_EQ(result.patches.size() + rejected, seeds.size());
+  auto next = seeds.begin();
+  for (const ExtractedPatch& p : result.patches) {
+    next = std::find(next, seeds.end(), *p.seed_index);
+    ASSERT_NE(next, seeds.end());
+    EXPECT_EQ(p.seed, (*cloud.points)[*p.seed_index].getVector3fMap().cast<double>());
+  }
+}
+
+/// The covariances that the sensor's model gives, attached to the cloud.
+RangeCloud
+withCovariances(RangeCloud cloud, const Sensor& sensor)
+{
+  const Pose& pose = cloud.sensor_pose;
+  for (const pcl::PointXYZ& p : *cloud.points) {
+    const Eigen::Vector3d q = pose.toLocal(p.getVector3fMap().cast<double>());
+    cloud.covariances.emplace_back(
+        (pose.R * sensor.noise->covariance(q) * pose.R.transpose()).cast<float>());
+  }
+  return cloud;
+}
+
+TEST(ExtractPatches, TakesTheCovariancesOfTheCloud)
+{
+  Random random;
+  const Sensor sensor = makeSensor(kCamera);
+  const RangeCloud cloud = makeRollingCloud(random, randomPose(random));
+  const RangeCloud with = withCovariances(cloud, sensor);
+  Sensor other = sensor;
+  other.noise = std::make_shared<const ConstantNoiseModel>(
+      ConstantNoiseModel::Parameters{0.5, 0.5});
+  // Larger than the pixel pitch: neither neighbourhood is cut, whichever the sensor.
+  const ExtractionOptions options = makeOptions(0.08, 0.25);
+  const ExtractionResult a = extractPatches(cloud, sensor, options);
+  const ExtractionResult b = extractPatches(with, other, options);
+  ASSERT_EQ(a.patches.size(), b.patches.size());
+  EXPECT_EQ(b.invalid_covariances, 0);
+  // Covariances in single precision: 6e-8 each, and an ill-conditioned fit.
+  for (std::size_t i = 0; i < a.patches.size(); ++i)
+    expectSimilar(a.patches[i].fit, b.patches[i].fit, 1e-3);
+}
+
+TEST(ExtractPatches, LeavesOutPointsWithoutACovariance)
+{
+  Random random;
+  const Sensor sensor = makeSensor(kCamera);
+  const RangeCloud good =
+      withCovariances(makeOrganizedCloud(kCamera, rollingDepth), sensor);
+  RangeCloud bad = good;
+  bad.covariances[100](1, 1) = -1e-4F;
+  bad.covariances[5000].setConstant(test::kNaN);
+  bad.covariances[9000](0, 1) = 10.0F; // not symmetric, not definite
+  const ExtractionOptions options = makeOptions();
+  EXPECT_EQ(extractPatches(good, sensor, options).invalid_covariances, 0);
+  EXPECT_EQ(extractPatches(bad, sensor, options).invalid_covariances, 3);
+  const ExtractionResult whole = extractWhole(bad, sensor, options);
+  EXPECT_EQ(whole.invalid_covariances, 3);
+  ASSERT_EQ(whole.patches.size(), 1U);
+  EXPECT_EQ(whole.patches[0].fit.points, 160 * 120 - 3);
+}
+
+TEST(ExtractPatches, AsksModelsThatLookAtNeighborsForTheWholeImage)
+{
+  Random random;
+  const Pose pose = randomPose(random);
+  const RangeCloud cloud = makeRollingCloud(random, pose);
+  Sensor sensor = makeSensor(kCamera);
+  sensor.noise = std::make_shared<const DryanovskiNoiseModel>(sensor.noise);
+  std::vector<Eigen::Vector3d> image;
+  for (const pcl::PointXYZ& p : *cloud.points)
+    image.push_back(pose.toLocal(p.getVector3fMap().cast<double>()));
+  RangeCloud with = cloud;
+  with.covariances =
+      sensor.noise->imageCovariances(image, kCamera.width, kCamera.height);
+  for (Eigen::Matrix3f& S : with.covariances)
+    S = (pose.R.cast<float>() * S * pose.R.cast<float>().transpose()).eval();
+  ExtractionOptions options = makeOptions(0.08, 0.25);
+  // Cut by slope alone, since the depth noise of a single point is not that of the
+  // image.
+  options.sampler.jump_sigmas = 0.0;
+  options.sampler.max_slope = 10.0;
+  expectSameBits(extractPatches(cloud, sensor, options),
+                 extractPatches(with, sensor, options));
+}
+
+TEST(ExtractPatches, ReportsProgress)
+{
+  Random random;
+  const RangeCloud cloud = makeRollingCloud(random);
+  ExtractionOptions options = makeOptions(0.05, 0.05);
+  options.threads = 3;
+  int last = 0;
+  int total = 0;
+  options.progress = [&](int done, int of) {
+    EXPECT_GT(done, last);
+    last = done;
+    total = of;
+  };
+  extractPatches(cloud, makeSensor(kCamera), options);
+  EXPECT_GT(total, 100);
+  EXPECT_EQ(last, total);
+}
+
+TEST(ExtractPatches, LetsExceptionsOfTheCallerThrough)
+{
+  Random random;
+  const RangeCloud cloud = makeRollingCloud(random);
+  ExtractionOptions options = makeOptions(0.05, 0.05);
+  options.threads = 2;
+  options.progress = [](int, int) { throw std::runtime_error("enough"); };
+  EXPECT_THROW(extractPatches(cloud, makeSensor(kCamera), options), std::runtime_error);
+}
+
+TEST(ExtractWhole, FitsOnePlaneToAWall)
+{
+  Random random;
+  const RangeCloud cloud = makeOrganizedCloud(kCamera, [&](int, int) {
+    return 1.0 + 0.002 * random.normal();
+  });
+  ExtractionOptions options = makeOptions();
+  options.fit.surface = SurfaceRequest::Plane;
+  const ExtractionResult result = extractWhole(cloud, makeSensor(kCamera), options);
+  ASSERT_EQ(result.patches.size(), 1U);
+  const ExtractedPatch& p = result.patches[0];
+  EXPECT_FALSE(p.seed_index);
+  EXPECT_EQ(p.fit.points, 160 * 120);
+  // 2 mm over 19200 points leaves 0.014 mm.
+  EXPECT_NEAR(p.fit.patch.c.z(), 1.0, 1e-4);
+  EXPECT_LT(p.fit.patch.normal().z(), -0.999);
+}
+
+/// A can of 33 mm radius seen from all sides, about the origin.
+RangeCloud
+makeCan(Random& random)
+{
+  auto points = pcl::make_shared<pcl::PointCloud<pcl::PointXYZ>>();
+  for (int i = 0; i < 4000; ++i) {
+    const double angle = random.uniform(-3.14159265, 3.14159265);
+    const double radius = 0.033 + 0.0005 * random.normal();
+    points->push_back({static_cast<float>(radius * std::cos(angle)),
+                       static_cast<float>(radius * std::sin(angle)),
+                       static_cast<float>(random.uniform(-0.06, 0.06))});
+  }
+  return {points, {}, {}};
+}
+
+TEST(UnknownSensor, ScansFromAllSidesGetConstantNoiseAndANotice)
+{
+  Random random;
+  const RangeCloud can = makeCan(random);
+  const ExtractionOptions options = makeOptions(0.015, 0.02);
+  const ExtractionResult result = extractPatches(can, makeSensor(kCamera), options);
+  ASSERT_EQ(result.notices.size(), 1U);
+  EXPECT_EQ(result.notices[0].find('\n'), std::string::npos);
+  EXPECT_EQ(result.invalid_covariances, 0);
+  EXPECT_GT(result.patches.size(), 20U);
+
+  Sensor constant = makeSensor(kCamera);
+  constant.noise = std::make_shared<const ConstantNoiseModel>(
+      ConstantNoiseModel::Parameters{0.001, 0.001});
+  ExtractionResult chosen = extractPatches(can, constant, options);
+  EXPECT_TRUE(chosen.notices.empty());
+  chosen.notices = result.notices;
+  expectSameBits(chosen, result);
+}
+
+TEST(UnknownSensor, FewPointsBehindTheCameraAreLeftOut)
+{
+  Random random;
+  auto points = pcl::make_shared<pcl::PointCloud<pcl::PointXYZ>>();
+  for (int i = 0; i < 500; ++i)
+    points->push_back({static_cast<float>(random.uniform(-0.1, 0.1)),
+                       static_cast<float>(random.uniform(-0.1, 0.1)),
+                       static_cast<float>(1.0 + 0.002 * random.normal())});
+  points->push_back({0.0F, 0.0F, -0.5F});
+  points->push_back({0.0F, 0.0F, 0.0F});
+  const ExtractionResult result =
+      extractWhole({points, {}, {}}, makeSensor(kCamera), makeOptions());
+  EXPECT_TRUE(result.notices.empty());
+  EXPECT_EQ(result.invalid_covariances, 2);
+  ASSERT_EQ(result.patches.size(), 1U);
+  EXPECT_EQ(result.patches[0].fit.points, 500);
+  EXPECT_EQ(result.patches[0].fit.invalid_points, 2);
+}
+
+TEST(Degenerate, CloudsWithTooFewPointsGiveAStatus)
+{
+  const Sensor sensor = makeSensor(kCamera);
+  const ExtractionOptions options = makeOptions();
+  const auto empty = pcl::make_shared<pcl::PointCloud<pcl::PointXYZ>>();
+  const RangeCloud all_nan =
+      makeOrganizedCloud(kCamera, [](int, int) { return std::nan(""); });
+  auto point = pcl::make_shared<pcl::PointCloud<pcl::PointXYZ>>();
+  point->push_back({0.0F, 0.0F, 1.0F});
+  const std::map<FitStatus, int> one_too_few{{FitStatus::TooFewPoints, 1}};
+  for (const RangeCloud& cloud : {RangeCloud{empty, {}, {}}, all_nan}) {
+    const ExtractionResult result = extractPatches(cloud, sensor, options);
+    EXPECT_TRUE(result.patches.empty());
+    EXPECT_TRUE(result.rejected.empty());
+    EXPECT_EQ(extractWhole(cloud, sensor, options).rejected, one_too_few);
+  }
+  const RangeCloud alone{point, {}, {}};
+  EXPECT_EQ(extractPatches(alone, sensor, options).rejected, one_too_few);
+  EXPECT_EQ(extractWhole(alone, sensor, options).rejected, one_too_few);
+}
+
+TEST(Misuse, Throws)
+{
+  Random random;
+  const RangeCloud cloud = makeRollingCloud(random);
+  const auto expectThrow =
+      [](const RangeCloud& c, const Sensor& sensor, const ExtractionOptions& options) {
+        EXPECT_THROW(extractPatches(c, sensor, options), std::invalid_argument);
+      };
+  const Sensor sensor = makeSensor(kCamera);
+  ExtractionOptions options = makeOptions();
+  options.threads = -1;
+  expectThrow(cloud, sensor, options);
+  options = makeOptions();
+  options.sampler.radius_m = -1.0;
+  expectThrow(cloud, sensor, options);
+  options = makeOptions();
+  options.fit.containment = 2.0;
+  expectThrow(cloud, sensor, options);
+  EXPECT_THROW(extractWhole(cloud, sensor, options), std::invalid_argument);
+  expectThrow({}, sensor, makeOptions());
+  Sensor silent = sensor;
+  silent.noise = nullptr;
+  expectThrow(cloud, silent, makeOptions());
+}
+
+}} // namespace holdfast

@@ -1,0 +1,289 @@
+#include <holdfast/io/atomic_file.h>
+#include <holdfast/io/patch_io.h>
+
+#include "support/random.h"
+#include "support/run_program.h"
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <sstream>
+
+namespace holdfast { namespace {
+
+Patch
+somePatch(PatchType type, test::Random& random)
+{
+  Patch patch;
+  patch.type = type;
+  for (int i = 0; i < 4; ++i)
+    patch.d(i) =
+        i < boundaryParameterCount(type.boundary) ? random.uniform(0.05, 0.1) : 0;
+  if (type.boundary == BoundaryType::Quad)
+    patch.d(4) = random.uniform(0.6, 0.9);
+  const double sign = type.surface == SurfaceType::HyperbolicParaboloid ? -1.0 : 1.0;
+  if (curvatureParameterCount(type.surface) > 0)
+    patch.kappa.x() = random.uniform(1.0, 3.0);
+  if (curvatureParameterCount(type.surface) > 1)
+    patch.kappa.y() = sign * random.uniform(4.0, 6.0);
+  patch.r = Eigen::Vector3d(random.normal(), random.normal(), 0.0) / 3.0;
+  patch.c = Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+  return patch;
+}
+
+/// One patch of every type with numbers that have no short decimal form.
+PatchReport
+someReport()
+{
+  test::Random random;
+  PatchReport report;
+  report.cloud = "folder/a \"cloud\".pcd";
+  report.sensor.name = "kinect_v1";
+  report.load_ms = 1.0 / 3.0;
+  report.fit_ms = 2.0;
+  report.result.rejected = {{FitStatus::TooFewPoints, 3}, {FitStatus::Degenerate, 1}};
+  for (const PatchType type : kPatchTypes) {
+    ExtractedPatch extracted;
+    FitResult& fit = extracted.fit;
+    fit.status = FitStatus::Converged;
+    fit.patch = somePatch(type, random);
+    const int n = degreesOfFreedom(type);
+    fit.covariance.resize(n, n);
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j <= i; ++j)
+        fit.covariance(i, j) = fit.covariance(j, i) = 1e-5 * random.normal();
+    fit.chi2 = random.uniform(0.0, 100.0);
+    fit.chi2_dof = 94;
+    fit.points = 100;
+    fit.iterations = 5;
+    extracted.seed_index = 17;
+    extracted.seed = Eigen::Vector3d(0.1, 0.2, 1.0 / 3.0);
+    extracted.radius_m = 0.05;
+    report.result.patches.push_back(extracted);
+  }
+  return report;
+}
+
+std::string
+jsonText(const PatchReport& report, JsonLayout layout)
+{
+  std::ostringstream out;
+  writeJson(out, report, layout);
+  return out.str();
+}
+
+TEST(PatchIo, JsonComesBackBitForBit)
+{
+  const PatchReport report = someReport();
+  for (const JsonLayout layout : {JsonLayout::OneLine, JsonLayout::PatchPerLine}) {
+    const PatchReport read = readJson(jsonText(report, layout));
+    EXPECT_EQ(read.cloud, report.cloud);
+    EXPECT_EQ(read.result.rejected, report.result.rejected);
+    ASSERT_EQ(read.result.patches.size(), report.result.patches.size());
+    for (std::size_t i = 0; i < read.result.patches.size(); ++i) {
+      const ExtractedPatch& a = report.result.patches[i];
+      const ExtractedPatch& b = read.result.patches[i];
+      EXPECT_EQ(a.fit.patch.type, b.fit.patch.type);
+      EXPECT_EQ(pack(a.fit.patch), pack(b.fit.patch));
+      EXPECT_EQ(a.fit.covariance, b.fit.covariance);
+      EXPECT_EQ(a.fit.chi2, b.fit.chi2);
+      EXPECT_EQ(a.fit.points, b.fit.points);
+      EXPECT_EQ(a.fit.status, b.fit.status);
+      EXPECT_EQ(a.seed_index, b.seed_index);
+      EXPECT_EQ(a.seed, b.seed);
+      EXPECT_EQ(a.radius_m, b.radius_m);
+    }
+  }
+}
+
+TEST(PatchIo, JsonHasTheDocumentedMembers)
+{
+  const auto json =
+      nlohmann::ordered_json::parse(jsonText(someReport(), JsonLayout::PatchPerLine));
+  std::vector<std::string> members;
+  for (const auto& item : json.items())
+    members.push_back(item.key());
+  EXPECT_EQ(members,
+            (std::vector<std::string>{"holdfast",
+                                      "cloud",
+                                      "sensor",
+                                      "options",
+                                      "patches",
+                                      "rejected",
+                                      "timing"}));
+  EXPECT_EQ(json["rejected"]["too_few_points"], 3);
+  EXPECT_EQ(json["timing"]["patches_per_second"], 5000.0); // 10 patches in 2 ms
+  members.clear();
+  const auto& patch = json["patches"][0];
+  for (const auto& item : patch.items())
+    members.push_back(item.key());
+  EXPECT_EQ(members,
+            (std::vector<std::string>{"surface",
+                                      "boundary",
+                                      "dof",
+                                      "names",
+                                      "parameters",
+                                      "covariance",
+                                      "covariance_mode",
+                                      "status",
+                                      "points",
+                                      "chi2",
+                                      "chi2_dof",
+                                      "iterations",
+                                      "seed",
+                                      "radius"}));
+  EXPECT_EQ(patch["surface"], "elliptic_paraboloid");
+  EXPECT_EQ(patch["boundary"], "ellipse");
+  EXPECT_EQ(patch["dof"], 10);
+  EXPECT_EQ(patch["names"].size(), 10U);
+  EXPECT_EQ(patch["names"][3], "kappa_y");
+  EXPECT_EQ(patch["covariance"].size(), 10U);
+  EXPECT_EQ(patch["covariance"][9].size(), 10U);
+  EXPECT_EQ(patch["covariance_mode"], "exact");
+  EXPECT_EQ(patch["seed"]["index"], 17);
+}
+
+TEST(PatchIo, OneLineIsOneLine)
+{
+  const std::string text = jsonText(someReport(), JsonLayout::OneLine);
+  EXPECT_EQ(text.find('\n'), text.size() - 1);
+}
+
+TEST(PatchIo, WholeFitsHaveNoSeedAndInfinityIsNull)
+{
+  PatchReport report = someReport();
+  report.whole = true;
+  report.result.patches[0].seed_index.reset();
+  report.result.patches[0].fit.chi2 = std::numeric_limits<double>::infinity();
+  report.result.patches[0].fit.covariance(1, 1) = std::nan("");
+  const auto json = nlohmann::json::parse(jsonText(report, JsonLayout::OneLine));
+  EXPECT_TRUE(json["patches"][0]["seed"].is_null());
+  EXPECT_TRUE(json["patches"][0]["chi2"].is_null());
+  EXPECT_TRUE(json["patches"][0]["covariance"][1][1].is_null());
+  EXPECT_TRUE(json["options"]["sampler"].is_null());
+}
+
+TEST(PatchIo, FileNamesThatAreNoUtf8)
+{
+  PatchReport report;
+  report.cloud = "\xff\xfe.pcd";
+  EXPECT_NO_THROW(nlohmann::json::parse(jsonText(report, JsonLayout::OneLine)));
+}
+
+TEST(PatchIo, ForeignJsonIsAnError)
+{
+  EXPECT_THROW(readJson(""), std::runtime_error);
+  EXPECT_THROW(readJson("[1,2"), std::runtime_error);
+  EXPECT_THROW(readJson("{\"patches\":[]}"), std::runtime_error);
+  std::string text = jsonText(someReport(), JsonLayout::OneLine);
+  text.replace(text.find("\"converged\""), 11, "\"confused!\"");
+  EXPECT_THROW(readJson(text), std::runtime_error);
+}
+
+/// Vertex and face counts announced by a PLY header.
+std::pair<int, int>
+meshCounts(const std::string& ply)
+{
+  const auto count = [&ply](const std::string& element) {
+    const std::string entry = "element " + element + " ";
+    return std::stoi(ply.substr(ply.find(entry) + entry.size()));
+  };
+  return {count("vertex"), count("face")};
+}
+
+TEST(PatchIo, MeshIsWhatItsHeaderSays)
+{
+  const PatchReport report = someReport();
+  std::ostringstream binary;
+  std::ostringstream text;
+  writeMesh(binary, report.result.patches, false);
+  writeMesh(text, report.result.patches, true);
+  const auto [vertices, faces] = meshCounts(binary.str());
+  EXPECT_EQ(meshCounts(text.str()), std::make_pair(vertices, faces));
+  EXPECT_GT(vertices, 10 * 20); // ten patches, edges an eighth of their length
+  const std::string end = "end_header\n";
+  const std::string data = binary.str().substr(binary.str().find(end) + end.size());
+  // Vertices: three floats and three bytes; faces: a byte and three integers.
+  EXPECT_EQ(data.size(), static_cast<std::size_t>(15 * vertices + 13 * faces));
+
+  std::istringstream rows(text.str().substr(text.str().find(end) + end.size()));
+  for (int i = 0; i < vertices; ++i) {
+    double x, y, z;
+    int red, green, blue;
+    ASSERT_TRUE(rows >> x >> y >> z >> red >> green >> blue);
+    EXPECT_TRUE(std::isfinite(x) && std::isfinite(y) && std::isfinite(z));
+    EXPECT_LE(std::max({red, green, blue}), 255);
+  }
+  for (int i = 0; i < faces; ++i) {
+    int n, a, b, c;
+    ASSERT_TRUE(rows >> n >> a >> b >> c);
+    EXPECT_EQ(n, 3);
+    EXPECT_TRUE(std::min({a, b, c}) >= 0 && std::max({a, b, c}) < vertices);
+  }
+  std::string more;
+  EXPECT_FALSE(rows >> more);
+}
+
+TEST(PatchIo, SurfaceColorsDiffer)
+{
+  std::vector<std::array<std::uint8_t, 3>> colors;
+  for (int i = 0; i <= static_cast<int>(SurfaceType::CircularParaboloid); ++i)
+    colors.push_back(surfaceColor(static_cast<SurfaceType>(i)));
+  std::sort(colors.begin(), colors.end());
+  EXPECT_EQ(std::unique(colors.begin(), colors.end()), colors.end());
+}
+
+TEST(AtomicFile, AppearsWholeOrNotAtAll)
+{
+  const std::string folder = test::freshFolder("atomic_file");
+  const std::string path = folder + "/result.txt";
+  {
+    AtomicFile file(path);
+    file.stream() << "half";
+  }
+  EXPECT_TRUE(test::filesIn(folder).empty());
+  {
+    AtomicFile file(path);
+    file.stream() << "whole";
+    file.commit();
+  }
+  EXPECT_EQ(test::filesIn(folder), std::vector<std::string>{"result.txt"});
+  {
+    AtomicFile file(path);
+    file.stream() << "never finished";
+  }
+  EXPECT_EQ(test::readFile(path), "whole");
+}
+
+TEST(AtomicFile, DevicesStayDevices)
+{
+  AtomicFile null("/dev/null");
+  null.stream() << "gone";
+  null.commit();
+  EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
+  AtomicFile full("/dev/full");
+  full.stream() << "too much";
+  EXPECT_THROW(full.commit(), std::runtime_error);
+}
+
+TEST(AtomicFile, ErrorsNameFileAndCause)
+{
+  const std::string folder = test::freshFolder("atomic_file_errors");
+  try {
+    AtomicFile file(folder + "/none/result.txt");
+    FAIL() << "wrote into a folder that is not there";
+  }
+  catch (const std::runtime_error& error) {
+    const std::string message = error.what();
+    EXPECT_EQ(message,
+              folder +
+                  "/none/result.txt: cannot be written: No such file or directory");
+  }
+  EXPECT_THROW(AtomicFile{folder}, std::runtime_error);
+}
+
+}} // namespace holdfast
