@@ -11,6 +11,7 @@
 
 namespace holdfast {
 
+void addExperimentCommand(CLI::App& app, int& exit_code);
 void addFitCommand(CLI::App& app, int& exit_code);
 void addInfoCommand(CLI::App& app, int& exit_code);
 void addSimulateCommand(CLI::App& app, int& exit_code);

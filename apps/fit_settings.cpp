@@ -38,7 +38,10 @@ const Choices<SeedStrategy> kSeedStrategies{{"grid", SeedStrategy::Grid},
 
 const Choices<CovarianceMode> kCovarianceModes{
     {"exact", CovarianceMode::Exact},
-    {"gauss-newton", CovarianceMode::GaussNewton}};
+    {"gauss-newton", CovarianceMode::GaussNewton},
+    {"second-order", CovarianceMode::SecondOrder},
+    {"stagewise", CovarianceMode::Stagewise},
+    {"monte-carlo", CovarianceMode::MonteCarlo}};
 
 const Choices<Residual> kResiduals{{"sampson", Residual::Sampson},
                                    {"ray", Residual::Ray}};
@@ -160,7 +163,7 @@ addPatchOptions(CLI::App& command, FitSettings& settings)
             fit.residual,
             kResiduals,
             "Distance to minimise: first order, or exact along the noise")
-      ->default_str("sampson")
+      ->default_str("ray")
       ->group(group);
   command
       .add_flag(
@@ -177,8 +180,9 @@ addRunOptions(CLI::App& command, FitSettings& settings)
             "--covariance",
             settings.extraction.covariance,
             kCovarianceModes,
-            "Covariance of the parameters: first order with the full Hessian, or with "
-            "its Gauss-Newton approximation")
+            "Covariance of the parameters: exact to first order; its Gauss-Newton "
+            "approximation; with second-order terms; the paper's chain of stages; or "
+            "1000 refits to resampled points")
       ->default_str("exact")
       ->group("Patches");
   command

@@ -18,6 +18,7 @@ constexpr const char* kExamples = R"(Examples:
   holdfast fit rocks.pcd -o results         and as JSON and a coloured mesh
   holdfast fit can.pcd --whole --surface cylinder --json -
                                             one patch to all points, as JSON
+  holdfast experiment table1                are the covariances right?
 
 'holdfast COMMAND --help' explains a command.
 Exit codes: 0 all done, 1 something failed, 2 wrong usage.
@@ -45,6 +46,7 @@ run(int argc, char** argv)
   holdfast::addFitCommand(app, exit_code);
   holdfast::addInfoCommand(app, exit_code);
   holdfast::addSimulateCommand(app, exit_code);
+  holdfast::addExperimentCommand(app, exit_code);
   try {
     app.parse(argc, argv);
     return flushed(exit_code);

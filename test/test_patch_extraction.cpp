@@ -1,6 +1,7 @@
 #include "support/organized_cloud.h"
 #include "support/random.h"
 
+#include <holdfast/fit/reference_points.h>
 #include <holdfast/pcl/patch_extraction.h>
 #include <holdfast/sensor/constant_noise_model.h>
 #include <holdfast/sensor/dryanovski_noise_model.h>
@@ -125,33 +126,58 @@ TEST(ExtractPatches, DoesNotDependOnTheNumberOfThreads)
   }
 }
 
+/// Where the noise model is asked: at the points, or where they belong on the surface.
+std::vector<Eigen::Vector3d>
+noisePoints(const std::vector<Eigen::Vector3d>& camera_points, bool at_surface)
+{
+  if (!at_surface)
+    return camera_points;
+  PointBatch batch;
+  for (const Eigen::Vector3d& q : camera_points)
+    batch.add(q, Eigen::Matrix3d::Zero());
+  computeReferencePoints(batch, Eigen::Vector3d::Zero());
+  std::vector<Eigen::Vector3d> moved;
+  for (int i = 0; i < batch.size(); ++i)
+    moved.emplace_back(batch.channel(PointBatch::RX)[i],
+                       batch.channel(PointBatch::RY)[i],
+                       batch.channel(PointBatch::RZ)[i]);
+  return moved;
+}
+
 TEST(ExtractPatches, IsNeighborhoodThenCovariancesThenFit)
 {
   Random random;
   const Pose pose = randomPose(random);
   const RangeCloud cloud = makeRollingCloud(random, pose);
   const Sensor sensor = makeSensor(kCamera);
-  const ExtractionOptions options = makeOptions(0.08, 0.25);
-  const ExtractionResult result = extractPatches(cloud, sensor, options);
-  ASSERT_GT(result.patches.size(), 5U);
+  for (const bool at_surface : {false, true}) {
+    ExtractionOptions options = makeOptions(0.08, 0.25);
+    options.fit.noise_at_surface = at_surface;
+    const ExtractionResult result = extractPatches(cloud, sensor, options);
+    ASSERT_GT(result.patches.size(), 5U);
 
-  const NeighborhoodSampler sampler(cloud, sensor, options.sampler);
-  const auto scratch = sampler.makeScratch();
-  FitOptions fit = options.fit;
-  fit.viewpoint = pose.c;
-  for (const ExtractedPatch& extracted : result.patches) {
-    std::vector<int> indices;
-    sampler.neighborhood(*extracted.seed_index, *scratch, indices);
-    PointBatch batch;
-    batch.clear(extracted.seed);
-    for (const int i : indices) {
-      const Eigen::Vector3d p = (*cloud.points)[i].getVector3fMap().cast<double>();
-      const Eigen::Matrix3d S = sensor.noise->covariance(pose.toLocal(p));
-      batch.add(p, pose.R * S * pose.R.transpose());
+    const NeighborhoodSampler sampler(cloud, sensor, options.sampler);
+    const auto scratch = sampler.makeScratch();
+    FitOptions fit = options.fit;
+    fit.viewpoint = pose.c;
+    for (const ExtractedPatch& extracted : result.patches) {
+      std::vector<int> indices;
+      sampler.neighborhood(*extracted.seed_index, *scratch, indices);
+      std::vector<Eigen::Vector3d> points, camera_points;
+      for (const int i : indices) {
+        points.push_back((*cloud.points)[i].getVector3fMap().cast<double>());
+        camera_points.push_back(pose.toLocal(points.back()));
+      }
+      const std::vector<Eigen::Vector3d> at = noisePoints(camera_points, at_surface);
+      PointBatch batch;
+      batch.clear(extracted.seed);
+      for (std::size_t i = 0; i < points.size(); ++i)
+        batch.add(points[i],
+                  pose.R * sensor.noise->covariance(at[i]) * pose.R.transpose());
+      // The sums of three products in another order, and an ill-conditioned fit.
+      expectSimilar(estimatePatch(batch, fit, options.covariance), extracted.fit, 1e-6);
+      EXPECT_EQ(extracted.radius_m, options.sampler.radius_m);
     }
-    // The sums of three products in another order, and an ill-conditioned fit.
-    expectSimilar(estimatePatch(batch, fit, options.covariance), extracted.fit, 1e-6);
-    EXPECT_EQ(extracted.radius_m, options.sampler.radius_m);
   }
 }
 
@@ -215,7 +241,8 @@ TEST(ExtractPatches, TakesTheCovariancesOfTheCloud)
   other.noise = std::make_shared<const ConstantNoiseModel>(
       ConstantNoiseModel::Parameters{0.5, 0.5});
   // Larger than the pixel pitch: neither neighbourhood is cut, whichever the sensor.
-  const ExtractionOptions options = makeOptions(0.08, 0.25);
+  ExtractionOptions options = makeOptions(0.08, 0.25);
+  options.fit.noise_at_surface = false; // the cloud's covariances are of its points
   const ExtractionResult a = extractPatches(cloud, sensor, options);
   const ExtractionResult b = extractPatches(with, other, options);
   ASSERT_EQ(a.patches.size(), b.patches.size());

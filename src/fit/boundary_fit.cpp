@@ -296,6 +296,8 @@ public:
 
   void curvature(int i, double value, const Row& row)
   {
+    if (value == 0.0)
+      out_.status = FitStatus::Degenerate;
     out_.patch.kappa[i] = value;
     out_.jacobian.row(layout_.k() + i) = row;
   }

@@ -5,6 +5,7 @@
 //   Number                    arithmetic type with + - * / among itself and with double
 //   kLanes                    points per Number
 //   load(const double*)       kLanes consecutive doubles
+//   store(Number, double*)    the reverse
 //   sumOfLanes(Number)        their sum
 //   squareRoot(Number)
 //   selectLess(a, b, x, y)    a < b ? x : y, lane by lane
@@ -867,6 +868,47 @@ quadricSums(const Points& points,
   HOLDFAST_UNROLL
   for (int e = 0; e < 6; ++e)
     out.z[e] = sumOfLanes(height[e]);
+}
+
+inline void
+moveOnto(const Points& points,
+         const double R[9],
+         const double c[3],
+         const double h[6],
+         const double viewpoint[3],
+         double* const out[3])
+{
+  Number origin[3], camera[3];
+  HOLDFAST_UNROLL
+  for (int k = 0; k < 3; ++k)
+    origin[k] = Number(viewpoint[k] - c[k]);
+  rotateIntoFrame(R, origin, camera);
+  for (int i = 0; i < points.padded_size; i += kLanes) {
+    Number offset[3], q[3], ray[3];
+    HOLDFAST_UNROLL
+    for (int k = 0; k < 3; ++k)
+      offset[k] = load(points.channel[k] + i) - c[k];
+    rotateIntoFrame(R, offset, q);
+    HOLDFAST_UNROLL
+    for (int k = 0; k < 3; ++k)
+      ray[k] = q[k] - camera[k];
+    Number move(0.0); // t - 1
+    HOLDFAST_UNROLL
+    for (int step = 0; step < 2; ++step) {
+      const Number x = q[0] + move * ray[0], y = q[1] + move * ray[1];
+      const Number hx = x * h[3] + y * h[4], hy = x * h[4] + y * h[5];
+      const Number height = x * (hx * 0.5 + h[1]) + y * (hy * 0.5 + h[2]) + h[0];
+      const Number slope = ray[2] - ray[0] * (hx + h[1]) - ray[1] * (hy + h[2]);
+      move = move - (q[2] + move * ray[2] - height) / slope;
+    }
+    const Number limit(0.1);
+    move = selectLess(move, limit, move, Number(0.0));
+    move = selectLess(0.0 - limit, move, move, Number(0.0));
+    HOLDFAST_UNROLL
+    for (int k = 0; k < 3; ++k)
+      store(load(points.channel[k] + i) * (move + 1.0) - move * viewpoint[k],
+            out[k] + i);
+  }
 }
 
 // ---- Choice of surface and residual -----------------------------------------------

@@ -17,6 +17,12 @@ load(const double* p)
   return *p;
 }
 
+void
+store(double x, double* p)
+{
+  *p = x;
+}
+
 double
 sumOfLanes(double x)
 {
@@ -98,6 +104,17 @@ accumulateCovariance(Model model,
                      CovarianceSums& sums)
 {
   covarianceSums(model, residual, points, state, sums);
+}
+
+void
+moveOntoQuadric(const Points& points,
+                const double R[9],
+                const double c[3],
+                const double h[6],
+                const double viewpoint[3],
+                double* const out[3])
+{
+  moveOnto(points, R, c, h, viewpoint, out);
 }
 
 } // namespace reference

@@ -59,6 +59,12 @@ load(const double* p)
   return Number(hn::Load(kTag, p));
 }
 
+HWY_INLINE void
+store(Number x, double* p)
+{
+  hn::Store(x.v, kTag, p);
+}
+
 HWY_INLINE double
 sumOfLanes(Number x)
 {
@@ -121,6 +127,17 @@ dispatchedCovariance(Model model,
   covarianceSums(model, residual, points, state, sums);
 }
 
+void
+dispatchedMove(const Points& points,
+               const double R[9],
+               const double c[3],
+               const double h[6],
+               const double viewpoint[3],
+               double* const out[3])
+{
+  moveOnto(points, R, c, h, viewpoint, out);
+}
+
 }}} // namespace holdfast::kernel::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -132,6 +149,7 @@ HWY_EXPORT(dispatchedScatter);
 HWY_EXPORT(dispatchedQuadric);
 HWY_EXPORT(dispatchedNormal);
 HWY_EXPORT(dispatchedCovariance);
+HWY_EXPORT(dispatchedMove);
 
 const char*
 instructionSet()
@@ -172,6 +190,17 @@ accumulateCovariance(Model model,
                      CovarianceSums& sums)
 {
   HWY_DYNAMIC_DISPATCH(dispatchedCovariance)(model, residual, points, state, sums);
+}
+
+void
+moveOntoQuadric(const Points& points,
+                const double R[9],
+                const double c[3],
+                const double h[6],
+                const double viewpoint[3],
+                double* const out[3])
+{
+  HWY_DYNAMIC_DISPATCH(dispatchedMove)(points, R, c, h, viewpoint, out);
 }
 
 }} // namespace holdfast::kernel
@@ -220,6 +249,17 @@ accumulateCovariance(Model model,
                      CovarianceSums& sums)
 {
   reference::accumulateCovariance(model, residual, points, state, sums);
+}
+
+void
+moveOntoQuadric(const Points& points,
+                const double R[9],
+                const double c[3],
+                const double h[6],
+                const double viewpoint[3],
+                double* const out[3])
+{
+  reference::moveOntoQuadric(points, R, c, h, viewpoint, out);
 }
 
 }} // namespace holdfast::kernel

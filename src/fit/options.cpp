@@ -3,6 +3,31 @@
 #include <cmath>
 
 namespace holdfast {
+namespace {
+
+SurfaceRequest
+requestFor(SurfaceType surface)
+{
+  switch (surface) {
+  case SurfaceType::Plane:
+    return SurfaceRequest::Plane;
+  case SurfaceType::Sphere:
+    return SurfaceRequest::Sphere;
+  case SurfaceType::CircularCylinder:
+    return SurfaceRequest::CircularCylinder;
+  case SurfaceType::EllipticParaboloid:
+    return SurfaceRequest::EllipticParaboloid;
+  case SurfaceType::HyperbolicParaboloid:
+    return SurfaceRequest::HyperbolicParaboloid;
+  case SurfaceType::CylindricParaboloid:
+    return SurfaceRequest::CylindricParaboloid;
+  case SurfaceType::CircularParaboloid:
+    break;
+  }
+  return SurfaceRequest::CircularParaboloid;
+}
+
+} // namespace
 
 FitOptions
 FitOptions::paper()
@@ -10,9 +35,20 @@ FitOptions::paper()
   FitOptions options;
   options.residual = Residual::Sampson;
   options.debias_scatter = false;
+  options.noise_at_surface = false;
   options.normal_from_pca = false;
   options.smooth_circle_radius = false;
   options.statistical_discrimination = false;
+  return options;
+}
+
+FitOptions
+withType(FitOptions options, PatchType type)
+{
+  options.surface = requestFor(type.surface);
+  options.plane_boundary.reset();
+  if (type.surface == SurfaceType::Plane)
+    options.plane_boundary = type.boundary;
   return options;
 }
 

@@ -129,7 +129,7 @@ PointBatch::pad()
 {
   reserve(roundedUp(size_));
   const int padded = paddedSize();
-  for (int c = 0; c < kChannels && size_ > 0; ++c) {
+  for (int c = 0; c <= W && size_ > 0; ++c) {
     double* values = channel(static_cast<Channel>(c));
     // Copies of a point stay within range of the surface; no covariance, no weight.
     std::fill(values + size_, values + padded, c < SXX ? values[size_ - 1] : 0.0);

@@ -8,6 +8,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 
+#include <algorithm>
 #include <cmath>
 
 namespace holdfast {
@@ -136,39 +137,6 @@ fullGradient(const UnboundedSurface& surface, const Scatter& scatter, const doub
   return gradient;
 }
 
-// The surface moved by a step of theta.
-UnboundedSurface
-retracted(const UnboundedSurface& surface, const Scatter& scatter, const Theta& step)
-{
-  UnboundedSurface next = surface;
-  Eigen::Vector3d delta = Eigen::Vector3d::Zero(), shift = Eigen::Vector3d::Zero();
-  switch (surface.model) {
-  case Model::Paraboloid:
-    next.k += step.head<3>();
-    delta.head<2>() = step.segment<2>(3);
-    next.a += step[5];
-    break;
-  case Model::Sphere:
-    next.k[0] += step[0];
-    shift = step.segment<3>(1);
-    break;
-  case Model::Cylinder:
-    next.k[0] += step[0];
-    delta.tail<2>() = step.segment<2>(1);
-    shift.tail<2>() = step.segment<2>(3);
-    break;
-  case Model::Plane:
-    delta.head<2>() = step.head<2>();
-    shift.z() = step[2];
-    break;
-  }
-  next.R = surface.R * expMap(delta);
-  next.c = surface.model == Model::Paraboloid ?
-               Eigen::Vector3d(scatter.mean + next.a * scatter.normal()) :
-               Eigen::Vector3d(surface.c + surface.R * shift);
-  return next;
-}
-
 // The weighted least-squares problem of one surface, as levenbergMarquardt() wants it.
 struct SurfaceProblem {
   using State = UnboundedSurface;
@@ -202,18 +170,36 @@ struct SurfaceProblem {
 
   State retract(const State& state, const Theta& step) const
   {
-    return retracted(state, scatter, step);
+    return retractedSurface(state, scatter, step);
   }
 };
 
+// Units that bring the normal equations to unit diagonal. For rotations none larger
+// than a radian: of points on a line, rounding knows the turn about it to 1e12 radians
+// or so.
+Theta
+unitScale(const ThetaMatrix& H, Model model)
+{
+  const int n = kernel::parameterCount(model);
+  const int shape = kernel::shapeParameterCount(model);
+  const int first_rotation = model == Model::Sphere ? shape : shape - 2;
+  Theta scale = Theta::Ones();
+  for (int i = 0; i < n; ++i) {
+    const bool rotation = i >= first_rotation && i < shape;
+    const double information = rotation ? std::max(H(i, i), 1.0) : H(i, i);
+    scale[i] = information > 0.0 ? 1.0 / std::sqrt(information) : 1.0;
+  }
+  return scale;
+}
+
 // Scales to unit diagonal and returns the smallest Cholesky pivot; 0 when not positive.
 double
-smallestPivot(const ThetaMatrix& H)
+smallestPivot(const ThetaMatrix& H, Model model)
 {
   const Theta diagonal = H.diagonal();
   if (!(diagonal.minCoeff() > 0.0) || !diagonal.allFinite())
     return 0.0;
-  const Theta scale = diagonal.cwiseSqrt().cwiseInverse();
+  const Theta scale = unitScale(H, model);
   const ThetaMatrix scaled = scale.asDiagonal() * H * scale.asDiagonal();
   const Eigen::LLT<ThetaMatrix> cholesky(scaled);
   if (cholesky.info() != Eigen::Success)
@@ -222,13 +208,12 @@ smallestPivot(const ThetaMatrix& H)
   return smallest * smallest;
 }
 
-// Undetermined directions: eigenvectors of the scaled normal equations.
+// Undetermined directions: eigenvectors of the scaled normal equations, of which there
+// is at least one where the smallest pivot is too small.
 NullSpace
-nullSpaceOf(const ThetaMatrix& H, int n)
+nullSpaceOf(const ThetaMatrix& H, Model model)
 {
-  Theta scale = Theta::Ones();
-  for (int i = 0; i < n; ++i)
-    scale[i] = H(i, i) > 0.0 ? 1.0 / std::sqrt(H(i, i)) : 1.0;
+  const Theta scale = unitScale(H, model);
   const ThetaMatrix scaled = scale.asDiagonal() * H * scale.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> solver(scaled);
   NullSpace space(6, 0);
@@ -363,7 +348,10 @@ statusOf(LevenbergMarquardtSummary::Stop stop)
 
 // Exact Newton steps; the sums of the last one also give the covariance.
 void
-polish(const SurfaceProblem& problem, const FitOptions& options, SurfaceFit& fit)
+polish(const SurfaceProblem& problem,
+       const FitOptions& options,
+       SurfaceFit& fit,
+       NullSpace& null_space)
 {
   kernel::CovarianceSums sums;
   for (fit.polish_steps = 1; fit.polish_steps <= kMaxPolishSteps; ++fit.polish_steps) {
@@ -374,28 +362,82 @@ polish(const SurfaceProblem& problem, const FitOptions& options, SurfaceFit& fit
                                  sums);
     fit.linearization = linearize(fit.surface, problem.scatter, sums);
     fit.cost = sums.cost;
+    if (!fit.linearization.H.allFinite()) {
+      fit.status = FitStatus::NonFinite;
+      return;
+    }
     const Eigen::LLT<ThetaMatrix> cholesky(fit.linearization.H);
     if (cholesky.info() != Eigen::Success ||
-        smallestPivot(fit.linearization.H) < kSmallestPivot) {
+        smallestPivot(fit.linearization.H, problem.model) < kSmallestPivot) {
       fit.status = FitStatus::Degenerate;
+      null_space = nullSpaceOf(fit.linearization.H, problem.model);
       return;
     }
     const Theta gradient = fullGradient(fit.surface, problem.scatter, sums.L);
     const Theta step = -cholesky.solve(gradient);
-    fit.surface = retracted(fit.surface, problem.scatter, step);
-    if (std::sqrt(std::max(0.0, -step.dot(gradient))) < options.polish_tolerance_sigma)
+    fit.surface = retractedSurface(fit.surface, problem.scatter, step);
+    if (std::sqrt(std::max(0.0, -step.dot(gradient))) <
+        options.polish_tolerance_sigma) {
+      fit.status = FitStatus::Converged;
       return;
+    }
   }
   fit.status = FitStatus::IterationLimit;
 }
 
+// Principal axes of the scatter, the normal on the side of `towards`.
+void
+setAxes(const Eigen::Vector3d& towards, Scatter& scatter)
+{
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(scatter.covariance);
+  scatter.eigenvalues = solver.eigenvalues();
+  const Eigen::Vector3d n = solver.eigenvectors().col(0);
+  scatter.axes.col(2) = n.dot(towards) < 0.0 ? Eigen::Vector3d(-n) : n;
+  scatter.axes.col(0) = solver.eigenvectors().col(2);
+  scatter.axes.col(1) = scatter.axes.col(2).cross(scatter.axes.col(0));
+}
+
 } // namespace
+
+UnboundedSurface
+retractedSurface(const UnboundedSurface& surface,
+                 const Scatter& scatter,
+                 const Theta& step)
+{
+  UnboundedSurface next = surface;
+  Eigen::Vector3d delta = Eigen::Vector3d::Zero(), shift = Eigen::Vector3d::Zero();
+  switch (surface.model) {
+  case Model::Paraboloid:
+    next.k += step.head<3>();
+    delta.head<2>() = step.segment<2>(3);
+    next.a += step[5];
+    break;
+  case Model::Sphere:
+    next.k[0] += step[0];
+    shift = step.segment<3>(1);
+    break;
+  case Model::Cylinder:
+    next.k[0] += step[0];
+    delta.tail<2>() = step.segment<2>(1);
+    shift.tail<2>() = step.segment<2>(3);
+    break;
+  case Model::Plane:
+    delta.head<2>() = step.head<2>();
+    shift.z() = step[2];
+    break;
+  }
+  next.R = surface.R * expMap(delta);
+  next.c = surface.model == Model::Paraboloid ?
+               Eigen::Vector3d(scatter.mean + next.a * scatter.normal()) :
+               Eigen::Vector3d(surface.c + surface.R * shift);
+  return next;
+}
 
 kernel::Points
 kernelPoints(const PointBatch& batch)
 {
   kernel::Points points;
-  for (int i = 0; i < PointBatch::kChannels; ++i)
+  for (int i = 0; i <= PointBatch::W; ++i)
     points.channel[i] = batch.channel(static_cast<PointBatch::Channel>(i));
   points.padded_size = batch.paddedSize();
   return points;
@@ -436,13 +478,20 @@ measureScatter(const PointBatch& batch, bool debias, const Eigen::Vector3d& view
       if (debias)
         scatter.covariance(i, j) -= sums.sigma[kIndex[i][j]] * inverse;
     }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(scatter.covariance);
-  scatter.eigenvalues = solver.eigenvalues();
-  const bool away = solver.eigenvectors().col(0).dot(viewpoint - scatter.mean) < 0.0;
-  scatter.axes.col(2) = (away ? -1.0 : 1.0) * solver.eigenvectors().col(0);
-  scatter.axes.col(0) = solver.eigenvectors().col(2);
-  scatter.axes.col(1) = scatter.axes.col(2).cross(scatter.axes.col(0));
+  setAxes(viewpoint - scatter.mean, scatter);
   return scatter;
+}
+
+Scatter
+withMoments(const Scatter& scatter,
+            const Eigen::Vector3d& mean,
+            const Eigen::Matrix3d& covariance)
+{
+  Scatter moved = scatter;
+  moved.mean = mean;
+  moved.covariance = covariance;
+  setAxes(scatter.normal(), moved);
+  return moved;
 }
 
 Eigen::Matrix3d
@@ -486,13 +535,17 @@ fitSurface(kernel::Model model,
   fit.status = statusOf(summary.stop);
   fit.cost = evaluation.cost;
   fit.JtJ = evaluation.JtJ;
+  if (!evaluation.JtJ.allFinite())
+    fit.status = FitStatus::NonFinite;
   if (fit.status != FitStatus::NonFinite &&
-      smallestPivot(evaluation.JtJ) < kSmallestPivot)
+      smallestPivot(evaluation.JtJ, model) < kSmallestPivot) {
     fit.status = FitStatus::Degenerate;
-  if (fit.status == FitStatus::Converged)
-    polish(problem, options, fit);
-  if (fit.status == FitStatus::Degenerate)
-    null_space = nullSpaceOf(evaluation.JtJ, kernel::parameterCount(model));
+    null_space = nullSpaceOf(evaluation.JtJ, model);
+  }
+  // Where residuals are large, Gauss-Newton may circle the minimum that Newton then
+  // finds.
+  if (fit.status == FitStatus::Converged || fit.status == FitStatus::IterationLimit)
+    polish(problem, options, fit, null_space);
   return fit;
 }
 

@@ -12,19 +12,7 @@
 #include <limits>
 
 namespace holdfast {
-namespace {
 
-using kernel::Model;
-
-// z = a0 + a1 x + a2 y + kxx x^2/2 + kxy x y + kyy y^2/2 over the principal frame.
-struct Quadric {
-  double a0 = 0.0;
-  Eigen::Vector2d slope = Eigen::Vector2d::Zero();
-  Eigen::Vector3d k = Eigen::Vector3d::Zero(); // kxx kxy kyy
-};
-
-// Unweighted least squares; a plane through the mean where the points do not determine
-// the quadric.
 Quadric
 leastSquaresQuadric(const kernel::Points& points, const Scatter& scatter)
 {
@@ -60,6 +48,10 @@ leastSquaresQuadric(const kernel::Points& points, const Scatter& scatter)
       scale.cwiseProduct(cholesky.solve(scale.cwiseProduct(b)));
   return {x[0], {x[1], x[2]}, {2.0 * x[3], x[4], 2.0 * x[5]}};
 }
+
+namespace {
+
+using kernel::Model;
 
 // The frame of the quadric where the line along the principal normal meets it.
 UnboundedSurface

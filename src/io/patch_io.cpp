@@ -105,6 +105,7 @@ optionsJson(const PatchReport& report)
           {"discrimination_level", fit.discrimination_level},
           {"residual", nameOf(kResiduals, fit.residual)},
           {"debias_scatter", fit.debias_scatter},
+          {"noise_at_surface", fit.noise_at_surface},
           {"normal_from_pca", fit.normal_from_pca},
           {"smooth_circle_radius", fit.smooth_circle_radius},
           {"statistical_discrimination", fit.statistical_discrimination},
@@ -119,20 +120,23 @@ patchJson(const ExtractedPatch& extracted, CovarianceMode mode)
   Json seed;
   if (extracted.seed_index)
     seed = {{"index", *extracted.seed_index}, {"point", vectorJson(extracted.seed)}};
-  return {{"surface", surfaceName(type.surface)},
-          {"boundary", boundaryName(type.boundary)},
-          {"dof", degreesOfFreedom(type)},
-          {"names", parameterNames(type)},
-          {"parameters", vectorJson(pack(fit.patch))},
-          {"covariance", matrixJson(fit.covariance)},
-          {"covariance_mode", covarianceModeName(mode)},
-          {"status", statusName(fit.status)},
-          {"points", fit.points},
-          {"chi2", fit.chi2},
-          {"chi2_dof", fit.chi2_dof},
-          {"iterations", fit.iterations},
-          {"seed", seed},
-          {"radius", extracted.seed_index ? Json(extracted.radius_m) : Json()}};
+  Json json{{"surface", surfaceName(type.surface)},
+            {"boundary", boundaryName(type.boundary)},
+            {"dof", degreesOfFreedom(type)},
+            {"names", parameterNames(type)},
+            {"parameters", vectorJson(pack(fit.patch))},
+            {"covariance", matrixJson(fit.covariance)},
+            {"covariance_mode", covarianceModeName(mode)},
+            {"status", statusName(fit.status)},
+            {"points", fit.points},
+            {"chi2", fit.chi2},
+            {"chi2_dof", fit.chi2_dof},
+            {"iterations", fit.iterations},
+            {"seed", seed},
+            {"radius", extracted.seed_index ? Json(extracted.radius_m) : Json()}};
+  if (mode == CovarianceMode::SecondOrder)
+    json["mean_shift"] = vectorJson(fit.mean_shift);
+  return json;
 }
 
 Json

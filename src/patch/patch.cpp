@@ -183,4 +183,67 @@ transformed(const Patch& patch, const Pose& T)
   return canonicalWith(moved, pose.R);
 }
 
+namespace {
+
+// The patch with its frame turned by pi/2 about z, x' = y: the same set of points.
+// One-curvature cylinders are told from their axis and have no such representation.
+Patch
+turnedByQuarter(const Patch& patch)
+{
+  Patch turned = patch;
+  Eigen::Matrix3d R = expMap(patch.r);
+  const Eigen::Vector3d x = R.col(0);
+  R.col(0) = R.col(1);
+  R.col(1) = -x;
+  turned.r = logMap(R);
+  std::swap(turned.kappa[0], turned.kappa[1]);
+  if (patch.type.boundary == BoundaryType::Quad) {
+    // Corner i of the new numbering is corner i + 1 of the old.
+    turned.d << patch.d[1], patch.d[2], patch.d[3], patch.d[0], 0.5 * kPi - patch.d[4];
+  }
+  else {
+    std::swap(turned.d[0], turned.d[1]);
+  }
+  return turned;
+}
+
+double
+angleBetween(const Patch& a, const Patch& b)
+{
+  return logMap(expMap(a.r).transpose() * expMap(b.r)).norm();
+}
+
+Eigen::Vector3d
+nearestCoordinates(const Eigen::Vector3d& r, const Eigen::Vector3d& reference)
+{
+  const double angle = r.norm();
+  if (angle == 0.0)
+    return r;
+  const Eigen::Vector3d other = r * (1.0 - 2.0 * kPi / angle);
+  return (other - reference).norm() < (r - reference).norm() ? other : r;
+}
+
+} // namespace
+
+Patch
+nearestRepresentation(const Patch& patch, const Patch& reference)
+{
+  Patch nearest = patch;
+  if (!isRevolute(patch.type)) {
+    const bool cylindric = curvatureParameterCount(patch.type.surface) == 1;
+    Patch candidate = patch;
+    double smallest = angleBetween(patch, reference);
+    for (int quarter = 1; quarter < 4; ++quarter) {
+      candidate = turnedByQuarter(candidate);
+      const double angle = angleBetween(candidate, reference);
+      if ((cylindric && quarter != 2) || angle >= smallest)
+        continue;
+      smallest = angle;
+      nearest = candidate;
+    }
+  }
+  nearest.r = nearestCoordinates(nearest.r, reference.r);
+  return nearest;
+}
+
 } // namespace holdfast

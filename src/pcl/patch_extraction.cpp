@@ -203,7 +203,7 @@ extractPatches(const RangeCloud& cloud,
   const Sensor applicable = checkedSensor(cloud, sensor, result.notices);
   const PatchEstimator estimator(checkedFitOptions(cloud, options), options.covariance);
   const NeighborhoodSampler sampler(cloud, applicable, options.sampler);
-  const PointGatherer gatherer(cloud, applicable.noise);
+  const PointGatherer gatherer(cloud, applicable.noise, options.fit.noise_at_surface);
   result.invalid_covariances = gatherer.countInvalidCovariances();
 
   const std::vector<int> seeds = sampler.seeds();
@@ -235,7 +235,7 @@ extractWhole(const RangeCloud& cloud,
   ExtractionResult result;
   const Sensor applicable = checkedSensor(cloud, sensor, result.notices);
   const PatchEstimator estimator(checkedFitOptions(cloud, options), options.covariance);
-  const PointGatherer gatherer(cloud, applicable.noise);
+  const PointGatherer gatherer(cloud, applicable.noise, options.fit.noise_at_surface);
   result.invalid_covariances = gatherer.countInvalidCovariances();
 
   const std::vector<int> indices = finitePoints(cloud);

@@ -1,5 +1,6 @@
 #include "point_gatherer.h"
 
+#include <holdfast/fit/reference_points.h>
 #include <holdfast/geometry/gaussian.h>
 
 #include <pcl/common/point_tests.h>
@@ -100,9 +101,12 @@ isCovariance(const Eigen::Matrix3d& S)
 
 } // namespace
 
-PointGatherer::PointGatherer(const RangeCloud& cloud, NoiseModel::ConstPtr noise)
+PointGatherer::PointGatherer(const RangeCloud& cloud,
+                             NoiseModel::ConstPtr noise,
+                             bool noise_at_surface)
 : cloud_(cloud)
 , noise_(std::move(noise))
+, noise_at_surface_(noise_at_surface)
 , to_camera_(cloud.sensor_pose.inverse())
 , in_camera_frame_(isIdentity(cloud.sensor_pose))
 , image_covariances_(imageCovariances(cloud, *noise_))
@@ -174,11 +178,16 @@ void
 PointGatherer::evaluateModel(PointBatch& batch) const
 {
   const int n = batch.size();
-  const double* z = batch.channel(PointBatch::Z);
+  if (noise_at_surface_)
+    computeReferencePoints(batch, Eigen::Vector3d::Zero());
+  const auto at = [&](PointBatch::Channel measured, PointBatch::Channel reference) {
+    return batch.channel(noise_at_surface_ ? reference : measured);
+  };
+  const double* z = at(PointBatch::Z, PointBatch::RZ);
   const CovarianceChannels s = covarianceChannels(batch);
   noise_->covariances(n,
-                      batch.channel(PointBatch::X),
-                      batch.channel(PointBatch::Y),
+                      at(PointBatch::X, PointBatch::RX),
+                      at(PointBatch::Y, PointBatch::RY),
                       z,
                       s);
   if (!noise_->isOmnidirectional())

@@ -10,11 +10,13 @@
 namespace holdfast {
 
 /// Copies neighbourhoods into batches, covariances from the cloud if it has any, else
-/// from the noise model. Refers to the cloud. A point that the model has no covariance
-/// for gets NaN, which the fit leaves out and counts.
+/// from the noise model (at the surface, if asked). Refers to the cloud. A point that
+/// the model has no covariance for gets NaN, which the fit leaves out and counts.
 class PointGatherer {
 public:
-  PointGatherer(const RangeCloud& cloud, NoiseModel::ConstPtr noise);
+  PointGatherer(const RangeCloud& cloud,
+                NoiseModel::ConstPtr noise,
+                bool noise_at_surface);
 
   /// Refills the batch with finite points of the cloud; `origin` (frame of the cloud)
   /// should be near them.
@@ -33,6 +35,7 @@ private:
 
   const RangeCloud& cloud_;
   NoiseModel::ConstPtr noise_;
+  bool noise_at_surface_;
   Pose to_camera_;
   bool in_camera_frame_;
   std::vector<Eigen::Matrix3f> image_covariances_;

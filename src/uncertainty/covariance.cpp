@@ -1,10 +1,15 @@
 #include <holdfast/geometry/gaussian.h>
 #include <holdfast/geometry/rotation.h>
 #include <holdfast/uncertainty/covariance.h>
+#include <holdfast/uncertainty/monte_carlo.h>
+#include <holdfast/uncertainty/second_order.h>
+#include <holdfast/uncertainty/stagewise.h>
 
 #include <Eigen/Cholesky>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace holdfast {
 namespace {
@@ -14,15 +19,22 @@ using ByTheta =
     Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor, kMaxParameters, 6>;
 using ByMoments =
     Eigen::Matrix<double, Eigen::Dynamic, 9, Eigen::RowMajor, kMaxParameters, 9>;
-using Matrix63 = Eigen::Matrix<double, 6, 3>;
+using JointMatrix = Eigen::Matrix<double, JointLayout::kSize, JointLayout::kSize>;
 
 // An axis whose angle is uncertain by this many radians is not observable: three sigmas
 // reach half-way to the next symmetric axis, pi/4, and first order means nothing there.
 constexpr double kUnobservableAngle = 0.25;
 
+// A normal that is uncertain by this many radians might point anywhere.
+constexpr double kUndeterminedTilt = 1.0;
+
 // |kappa| below this many of its sigmas cannot be told from zero, and 1/kappa, on which
 // the centre of a sphere or cylinder rests, has no first-order distribution.
 constexpr double kUnobservableSigmas = 3.0;
+
+// Below this many it is none: the terms of the centre's covariance grow with 1/kappa^2
+// and cancel, down to rounding.
+constexpr double kNoCurvatureSigmas = 0.1;
 
 const ThetaMatrix&
 hessianOf(const SurfaceFit& fit, CovarianceMode mode)
@@ -51,7 +63,8 @@ planeStageSums(const PatchFit& fit, const PointBatch& batch, const FitOptions& o
   const UnboundedSurface& surface = fit.surface.surface;
   const UnboundedSurface& plane = fit.plane.surface;
   const kernel::Points points = kernelPoints(batch);
-  std::vector<double> X, Xp;
+  // Kept between patches: no allocation once they have seen the largest.
+  thread_local std::vector<double> X, Xp;
   kernel::crossTerms(surface.model,
                      options.residual,
                      points,
@@ -105,6 +118,69 @@ planeStageTerms(const PatchFit& fit,
       ParameterMatrix(Gp * fit.plane.linearization.XX * Gp.transpose() + 2.0 * cross));
 }
 
+ParameterMatrix
+firstOrderCovariance(const PatchFit& fit,
+                     const PointBatch& batch,
+                     const FitOptions& options,
+                     CovarianceMode mode)
+{
+  const PatchJacobian& F = fit.bounded.jacobian;
+  const Linearization& l = fit.surface.linearization;
+  // d(estimate)/dq_i = G X_i + M D_i.
+  const ByTheta G =
+      gain(F.middleCols<6>(JointLayout::kTheta), hessianOf(fit.surface, mode));
+  const ByMoments M = F.middleCols<9>(JointLayout::kMean) + G * l.A;
+  const ParameterMatrix cross = G * (l.XD * M.transpose());
+  ParameterMatrix covariance = G * (l.XX * G.transpose()) + cross + cross.transpose() +
+                               M * (l.DD * M.transpose());
+  if (fit.has_plane_stage)
+    covariance += planeStageTerms(fit, batch, options, G, M, mode);
+  return symmetrized(covariance);
+}
+
+// Covariance of the joint variables (JointLayout).
+JointMatrix
+jointCovariance(const PatchFit& fit, const PointBatch& batch, const FitOptions& options)
+{
+  const Linearization& l = fit.surface.linearization;
+  const ThetaMatrix inverse = l.H.llt().solve(ThetaMatrix(ThetaMatrix::Identity()));
+  JointMatrix joint = JointMatrix::Zero();
+  joint.topLeftCorner<6, 6>() = thetaCovariance(l, l.H);
+  joint.block<6, 9>(0, JointLayout::kMean) = -inverse * (l.XD + l.A * l.DD);
+  joint.block<9, 9>(JointLayout::kMean, JointLayout::kMean) = l.DD;
+  if (fit.has_plane_stage) {
+    const Linearization& p = fit.plane.linearization;
+    const PlaneStageSums sums = planeStageSums(fit, batch, options);
+    const ThetaMatrix plane = p.H.llt().solve(ThetaMatrix(ThetaMatrix::Identity()));
+    const ThetaMatrix own = plane * p.XX * plane;
+    const ThetaMatrix with_theta =
+        inverse *
+        (sums.with_surface.transpose() + l.A * sums.with_moments.transpose()) * plane;
+    joint.block<3, 3>(JointLayout::kPlane, JointLayout::kPlane) =
+        own.topLeftCorner<3, 3>();
+    joint.block<6, 3>(0, JointLayout::kPlane) = with_theta.leftCols<3>();
+    joint.block<9, 3>(JointLayout::kMean, JointLayout::kPlane) =
+        -(plane * sums.with_moments).transpose().leftCols<3>();
+  }
+  joint.triangularView<Eigen::StrictlyLower>() = joint.transpose();
+  // Padding of theta has no variance.
+  const int n = kernel::parameterCount(fit.surface.surface.model);
+  joint.block(n, n, 6 - n, 6 - n).setZero();
+  return joint;
+}
+
+// Standard deviation of the normal's direction, radians.
+double
+tiltSigma(const Patch& patch, const ParameterMatrix& covariance)
+{
+  const ParameterLayout layout = layoutOf(patch.type);
+  const Eigen::Matrix3d J = rightJacobian(patch.r);
+  const auto rows = J.topLeftCorner(2, layout.r_count);
+  const auto S =
+      covariance.block(layout.r(), layout.r(), layout.r_count, layout.r_count);
+  return std::sqrt(std::max(0.0, rows.lazyProduct(S).cwiseProduct(rows).sum()));
+}
+
 // Standard deviation of the rotation about the patch's normal; 0 for revolute types.
 double
 axisSigma(const Patch& patch, const ParameterMatrix& covariance)
@@ -117,22 +193,28 @@ axisSigma(const Patch& patch, const ParameterMatrix& covariance)
   return std::sqrt(std::max(0.0, row.dot(S * row)));
 }
 
-bool
-curvatureObservable(const Patch& patch, const ParameterMatrix& covariance)
+// |kappa| in its sigmas, where the centre rests on 1/kappa; else as large as can be.
+double
+curvatureInSigmas(const Patch& patch, const ParameterMatrix& covariance)
 {
   if (patch.type.surface != SurfaceType::Sphere &&
       patch.type.surface != SurfaceType::CircularCylinder)
-    return true;
+    return std::numeric_limits<double>::infinity();
   const int k = layoutOf(patch.type).k();
-  return std::abs(patch.kappa[0]) >= kUnobservableSigmas * std::sqrt(covariance(k, k));
+  return std::abs(patch.kappa[0]) / std::sqrt(covariance(k, k));
 }
 
 FitStatus
 observability(const Patch& patch, const ParameterMatrix& covariance)
 {
-  if (!covariance.allFinite())
+  if (covariance.size() == 0 || !covariance.allFinite())
     return FitStatus::NonFinite;
-  if (!curvatureObservable(patch, covariance))
+  const double curvature = curvatureInSigmas(patch, covariance);
+  // Variances below zero: their terms have cancelled down to rounding.
+  if (covariance.diagonal().minCoeff() < 0.0 || !(curvature >= kNoCurvatureSigmas) ||
+      tiltSigma(patch, covariance) > kUndeterminedTilt)
+    return FitStatus::Degenerate;
+  if (curvature < kUnobservableSigmas)
     return FitStatus::CurvatureNotObservable;
   if (axisSigma(patch, covariance) > kUnobservableAngle)
     return FitStatus::AxisNotObservable;
@@ -144,29 +226,54 @@ observability(const Patch& patch, const ParameterMatrix& covariance)
 std::string_view
 covarianceModeName(CovarianceMode mode)
 {
-  return mode == CovarianceMode::Exact ? "exact" : "gauss_newton";
+  switch (mode) {
+  case CovarianceMode::Exact:
+    return "exact";
+  case CovarianceMode::GaussNewton:
+    return "gauss_newton";
+  case CovarianceMode::SecondOrder:
+    return "second_order";
+  case CovarianceMode::Stagewise:
+    return "stagewise";
+  case CovarianceMode::MonteCarlo:
+    return "monte_carlo";
+  }
+  return "unknown";
 }
 
-ParameterMatrix
+PatchCovariance
 patchCovariance(const PatchFit& fit,
                 const PointBatch& batch,
-                const FitOptions& options,
+                const PatchFitter& fitter,
                 CovarianceMode mode)
 {
+  PatchCovariance result;
   if (fit.status != FitStatus::Converged)
-    return {};
-  const PatchJacobian& F = fit.bounded.jacobian;
-  const Linearization& l = fit.surface.linearization;
-  // d(estimate)/dq_i = G X_i + M D_i.
-  const ByTheta G =
-      gain(F.middleCols<6>(JointLayout::kTheta), hessianOf(fit.surface, mode));
-  const ByMoments M = F.middleCols<9>(JointLayout::kMean) + G * l.A;
-  const ParameterMatrix cross = G * (l.XD * M.transpose());
-  ParameterMatrix covariance = G * (l.XX * G.transpose()) + cross + cross.transpose() +
-                               M * (l.DD * M.transpose());
-  if (fit.has_plane_stage)
-    covariance += planeStageTerms(fit, batch, options, G, M, mode);
-  return covariance;
+    return result;
+  if (mode == CovarianceMode::Stagewise) {
+    result.covariance = stagewiseCovariance(fit, batch, fitter.options());
+    return result;
+  }
+  if (mode == CovarianceMode::MonteCarlo) {
+    // One thread: callers are parallel over patches.
+    MonteCarloOptions monte_carlo;
+    monte_carlo.threads = 1;
+    result.covariance =
+        monteCarloCovariance(fit.bounded.patch, batch, fitter.options(), monte_carlo)
+            .covariance;
+    return result;
+  }
+  result.covariance = firstOrderCovariance(fit, batch, fitter.options(), mode);
+  if (mode == CovarianceMode::SecondOrder) {
+    const SecondOrderTerms terms =
+        secondOrderTerms(fit,
+                         fitter,
+                         batch.origin(),
+                         jointCovariance(fit, batch, fitter.options()));
+    result.covariance += terms.covariance;
+    result.mean_shift = terms.shift;
+  }
+  return result;
 }
 
 PatchEstimator::PatchEstimator(const FitOptions& options, CovarianceMode mode)
@@ -188,7 +295,9 @@ PatchEstimator::estimate(PointBatch& batch) const
   result.polish_steps = fit.surface.polish_steps;
   result.null_space = fit.null_space;
   if (fit.status == FitStatus::Converged) {
-    result.covariance = patchCovariance(fit, batch, fitter_.options(), mode_);
+    const PatchCovariance uncertainty = patchCovariance(fit, batch, fitter_, mode_);
+    result.covariance = uncertainty.covariance;
+    result.mean_shift = uncertainty.mean_shift;
     result.status = observability(result.patch, result.covariance);
     if (!isUsable(result.status))
       result.covariance.resize(0, 0);

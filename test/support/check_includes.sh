@@ -14,8 +14,8 @@ BEGIN {
   allowed["patch"] = "geometry"
   allowed["sensor"] = "geometry patch"
   allowed["fit"] = "geometry patch"
-  allowed["uncertainty"] = "geometry patch fit"
-  allowed["validation"] = "geometry patch fit uncertainty"
+  allowed["uncertainty"] = "geometry patch sensor fit"
+  allowed["validation"] = "geometry patch sensor fit uncertainty"
   allowed["pcl"] = "geometry patch sensor fit uncertainty validation"
   allowed["io"] = "geometry patch sensor fit uncertainty validation pcl"
   # Beside C++ standard headers, which have neither slash nor dot. What a public header

@@ -143,6 +143,17 @@ void accumulateQuadric(const Points& points,
                        const double c[3],
                        QuadricSums& sums);
 
+/// Moves every point along its ray from the viewpoint onto the quadric
+/// z = h[0] + h[1] x + h[2] y + h[3] x^2/2 + h[4] x y + h[5] y^2/2 of the frame (R, c),
+/// by two Newton steps; a point that would move by more than a tenth of its range
+/// stays.
+void moveOntoQuadric(const Points& points,
+                     const double R[9],
+                     const double c[3],
+                     const double h[6],
+                     const double viewpoint[3],
+                     double* const out[3]);
+
 void accumulateNormal(Model model,
                       Residual residual,
                       const Points& points,
@@ -174,6 +185,12 @@ void accumulateQuadric(const Points& points,
                        const double R[9],
                        const double c[3],
                        QuadricSums& sums);
+void moveOntoQuadric(const Points& points,
+                     const double R[9],
+                     const double c[3],
+                     const double h[6],
+                     const double viewpoint[3],
+                     double* const out[3]);
 void accumulateNormal(Model model,
                       Residual residual,
                       const Points& points,

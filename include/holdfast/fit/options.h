@@ -54,7 +54,7 @@ struct FitOptions {
   /// A fit with a larger curvature is rejected, 1/m.
   double max_curvature_per_m = 1e3;
 
-  int max_iterations = 50;
+  int max_iterations = 30;
   /// The iterations stop when the remaining Newton step is below this many sigmas.
   double step_tolerance_sigma = 1e-4;
   /// The final exact Newton step is repeated while it is longer than this, in sigmas.
@@ -66,10 +66,14 @@ struct FitOptions {
   double sigma_floor_m = 1e-6;
 
   // Departures from the paper that make the estimate unbiased; see paper().
-  Residual residual = Residual::Sampson;
+  Residual residual = Residual::Ray;
   /// Subtract the mean point covariance from the scatter matrix before PCA and moments:
   /// noise tilts the PCA normal and inflates the moments otherwise.
   bool debias_scatter = true;
+  /// Evaluate the noise model at the surface, not at the noisy point. The fit takes
+  /// covariances as they come: whoever evaluates the model honours this
+  /// (computeReferencePoints).
+  bool noise_at_surface = true;
   /// Normal of sphere and cylinder from the PCA, not from a weighted plane that does
   /// not fit them.
   bool normal_from_pca = true;
@@ -83,6 +87,9 @@ struct FitOptions {
   /// The paper's choices, all departures switched off.
   static FitOptions paper();
 };
+
+/// The same options with surface and boundary forced, so that no test decides.
+FitOptions withType(FitOptions options, PatchType type);
 
 /// Empty when the options make sense, else one sentence naming the first that does not.
 std::string validityError(const FitOptions& options);

@@ -11,12 +11,14 @@ namespace holdfast {
 
 /// N points with covariances in structure-of-arrays form: ten channels
 /// x y z sxx sxy sxz syy syz szz w in one aligned block, padded to a multiple of
-/// kLaneMultiple with points of weight 0. Coordinates are relative to `origin()`, so
-/// that clouds far from zero lose no precision. Memory is kept between uses: a batch
-/// that is refilled does not allocate once it has seen its largest neighbourhood.
+/// kLaneMultiple with points of weight 0, and three more for the points at which a
+/// noise model is to be evaluated (holdfast/fit/reference_points.h). Coordinates are
+/// relative to `origin()`, so that clouds far from zero lose no precision. Memory is
+/// kept between uses: a batch that is refilled does not allocate once it has seen its
+/// largest neighbourhood.
 class PointBatch {
 public:
-  enum Channel { X, Y, Z, SXX, SXY, SXZ, SYY, SYZ, SZZ, W, kChannels };
+  enum Channel { X, Y, Z, SXX, SXY, SXZ, SYY, SYZ, SZZ, W, RX, RY, RZ, kChannels };
   static constexpr int kLaneMultiple = 8;
 
   /// Forgets all points; `origin` in world coordinates should be near the points to

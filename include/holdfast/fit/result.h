@@ -18,7 +18,9 @@ enum class FitStatus : std::uint8_t {
                           ///< below three of its sigmas: the centre slides
   IterationLimit, ///< max_iterations reached; patch is the best so far
   TooFewPoints, ///< fewer valid points than surface parameters
-  Degenerate, ///< normal equations singular; see null_space
+  Degenerate, ///< normal equations singular (see null_space); no extent; |kappa| of a
+              ///< sphere or cylinder below a tenth of its sigma; or a normal
+              ///< uncertain by more than 1 rad
   CurvatureOutOfRange, ///< |kappa| > max_curvature_per_m
   CurvatureSignMismatch, ///< elliptic forced on opposite signs or hyperbolic on equal
   OrientationSingular, ///< |r_xy| = pi: the chart has no finite covariance there
@@ -42,6 +44,9 @@ struct FitResult {
   /// Covariance of [d | k | r | c] (holdfast/patch/parameters.h); 0 x 0 when not
   /// usable.
   ParameterMatrix covariance;
+  /// By how much the mean of the estimate is off, to second order; empty unless the
+  /// covariance was computed to second order. Not applied to the patch.
+  ParameterVector mean_shift;
   /// Sum of squared residuals over the point covariances, and its degrees of freedom
   /// (points minus surface parameters).
   double chi2 = 0.0;
@@ -50,7 +55,8 @@ struct FitResult {
   int invalid_points = 0; ///< points left out: not finite or indefinite covariance
   int iterations = 0; ///< damped Gauss-Newton steps tried
   int polish_steps = 0; ///< exact Newton steps at the end
-  /// Directions the data do not determine; no column unless Degenerate.
+  /// Directions the data do not determine; no column unless Degenerate, and none where
+  /// the surface is determined, but not its bounds or its normal.
   NullSpace null_space = NullSpace(6, 0);
 };
 

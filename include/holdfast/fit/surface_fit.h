@@ -76,6 +76,16 @@ Scatter measureScatter(const PointBatch& batch,
                        bool debias,
                        const Eigen::Vector3d& viewpoint);
 
+/// The scatter with other moments; its axes follow, the normal on the same side.
+Scatter withMoments(const Scatter& scatter,
+                    const Eigen::Vector3d& mean,
+                    const Eigen::Matrix3d& covariance);
+
+/// The surface moved by a step of theta.
+UnboundedSurface retractedSurface(const UnboundedSurface& surface,
+                                  const Scatter& scatter,
+                                  const Theta& step);
+
 /// P of dn = P dC n, the first-order change of the eigenvector n of the smallest
 /// eigenvalue of C (any axes; n unit): P = B (l0 I - B^T C B)^-1 B^T, B normal to n.
 Eigen::Matrix3d normalDerivative(const Eigen::Matrix3d& C, const Eigen::Vector3d& n);

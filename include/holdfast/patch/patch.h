@@ -54,4 +54,11 @@ Patch canonical(const Patch& patch);
 /// The same patch seen from another frame: pose' = T * pose (then canonical).
 Patch transformed(const Patch& patch, const Pose& T);
 
+/// The same surface and boundary written with the parameters nearest to the reference:
+/// x axis and axes of equal rank turned by multiples of pi/2 (bounds and kappas with
+/// them), and r or r (1 - 2 pi/|r|), which is the same rotation. The result need not be
+/// canonical. For differences between patches, which canonical form alone would break
+/// at its edges.
+Patch nearestRepresentation(const Patch& patch, const Patch& reference);
+
 } // namespace holdfast

@@ -1,0 +1,287 @@
+// The bounds of stages II-4 to II-9 as a function of surface and moments, and its
+// Jacobian, which the covariance of every type rests on.
+#include "support/finite_difference.h"
+#include "support/patch_batch.h"
+#include "support/random_patch.h"
+
+#include <holdfast/fit/boundary_fit.h>
+#include <holdfast/geometry/rotation.h>
+
+#include <Eigen/Eigenvalues>
+
+#include <boost/math/special_functions/erf.hpp>
+
+namespace holdfast { namespace {
+
+using kernel::Model;
+using test::Random;
+
+constexpr double kContainment = 0.95;
+
+Model
+modelOf(SurfaceType surface)
+{
+  return isParaboloid(surface)          ? Model::Paraboloid :
+         surface == SurfaceType::Plane  ? Model::Plane :
+         surface == SurfaceType::Sphere ? Model::Sphere :
+                                          Model::Cylinder;
+}
+
+// What boundPatch() takes, with the plane stage where it has one.
+struct Input {
+  PatchType type;
+  UnboundedSurface surface;
+  Scatter scatter;
+  bool has_plane = false;
+  UnboundedSurface plane;
+  bool smooth = true;
+
+  BoundedPatch bound() const
+  {
+    return boundPatch(type,
+                      surface,
+                      scatter,
+                      has_plane ? &plane : nullptr,
+                      {0.7, -1.1, 0.4},
+                      ContainmentFactors::of(kContainment),
+                      smooth);
+  }
+};
+
+// Axes of the scatter, normal on the side of `up`.
+void
+findAxes(Scatter& scatter, const Eigen::Vector3d& up)
+{
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(scatter.covariance);
+  scatter.eigenvalues = solver.eigenvalues();
+  const Eigen::Vector3d n = solver.eigenvectors().col(0);
+  scatter.axes.col(2) = n.dot(up) < 0.0 ? Eigen::Vector3d(-n) : n;
+  scatter.axes.col(0) = solver.eigenvectors().col(2);
+  scatter.axes.col(1) = scatter.axes.col(2).cross(scatter.axes.col(0));
+}
+
+// A frame turned by some 0.1 rad.
+Eigen::Matrix3d
+nearby(const Eigen::Matrix3d& R, Random& random)
+{
+  return R * expMap(random.uniformVector(-0.15, 0.15));
+}
+
+// Points of 4-10 cm extent about a surface of curvature 2-6 1/m, all at random.
+Input
+randomInput(PatchType type, Model model, Random& random)
+{
+  Input in;
+  in.type = type;
+  in.surface.model = model;
+  in.surface.R = random.rotation();
+  in.surface.k = Eigen::Vector3d(random.sign() * random.uniform(2.0, 3.5),
+                                 random.uniform(-1.0, 1.0),
+                                 random.sign() * random.uniform(4.5, 6.0));
+  const Eigen::Vector3d sigma(random.uniform(0.07, 0.1),
+                              random.uniform(0.04, 0.06),
+                              random.uniform(0.005, 0.01));
+  const Eigen::Matrix3d axes =
+      nearby(in.surface.R, random) * expMap({0.0, 0.0, random.uniform(-3.0, 3.0)});
+  in.scatter.count = 100;
+  in.scatter.mean = random.uniformVector(-0.2, 0.2);
+  in.scatter.covariance = axes * sigma.cwiseAbs2().asDiagonal() * axes.transpose();
+  findAxes(in.scatter, in.surface.R.col(2));
+  in.surface.a = random.uniform(-0.02, 0.02);
+  in.surface.c =
+      model == Model::Paraboloid ?
+          Eigen::Vector3d(in.scatter.mean + in.surface.a * in.scatter.normal()) :
+          Eigen::Vector3d(in.scatter.mean + random.uniformVector(-0.02, 0.02));
+  in.plane.model = Model::Plane;
+  in.plane.R = nearby(in.surface.R, random);
+  in.plane.c = in.scatter.mean;
+  return in;
+}
+
+using Joint = Eigen::Matrix<double, JointLayout::kSize, 1>;
+
+// The input moved by the joint variables, in the axes of the surface's frame, as the
+// solver's parameters are defined.
+Input
+moved(const Input& in, const Joint& joint)
+{
+  Input out = in;
+  const Eigen::Matrix3d& R = in.surface.R;
+  out.scatter.mean += R * joint.segment<3>(JointLayout::kMean);
+  const auto s = joint.segment<6>(JointLayout::kScatter);
+  Eigen::Matrix3d dC;
+  dC << s[0], s[1], s[2], s[1], s[3], s[4], s[2], s[4], s[5];
+  out.scatter.covariance += R * dC * R.transpose();
+  findAxes(out.scatter, in.scatter.normal());
+  const auto theta = joint.head<6>();
+  Eigen::Vector3d delta = Eigen::Vector3d::Zero();
+  switch (in.surface.model) {
+  case Model::Paraboloid:
+    out.surface.k += theta.head<3>();
+    delta.head<2>() = theta.segment<2>(3);
+    out.surface.a += theta[5];
+    out.surface.c = out.scatter.mean + out.surface.a * out.scatter.normal();
+    break;
+  case Model::Sphere:
+    out.surface.k[0] += theta[0];
+    out.surface.c += R * theta.segment<3>(1);
+    break;
+  case Model::Cylinder:
+    out.surface.k[0] += theta[0];
+    delta.tail<2>() = theta.segment<2>(1);
+    out.surface.c += R * Eigen::Vector3d(0.0, theta[3], theta[4]);
+    break;
+  case Model::Plane:
+    delta.head<2>() = theta.head<2>();
+    out.surface.c += R * Eigen::Vector3d(0.0, 0.0, theta[2]);
+    break;
+  }
+  out.surface.R = R * expMap(delta);
+  const auto plane = joint.segment<3>(JointLayout::kPlane);
+  out.plane.R = in.plane.R * expMap({plane[0], plane[1], 0.0});
+  out.plane.c += in.plane.R * Eigen::Vector3d(0.0, 0.0, plane[2]);
+  return out;
+}
+
+// Change of each joint variable that changes a patch of 0.1 m noticeably.
+Joint
+jointScale(Model model)
+{
+  Joint scale;
+  scale.head<6>() =
+      model == Model::Paraboloid ?
+          (Eigen::Matrix<double, 6, 1>() << 1, 1, 1, 0.1, 0.1, 0.01).finished() :
+      model == Model::Sphere ?
+          (Eigen::Matrix<double, 6, 1>() << 1, 0.01, 0.01, 0.01, 1, 1).finished() :
+      model == Model::Cylinder ?
+          (Eigen::Matrix<double, 6, 1>() << 1, 0.1, 0.1, 0.01, 0.01, 1).finished() :
+          (Eigen::Matrix<double, 6, 1>() << 0.1, 0.1, 0.01, 1, 1, 1).finished();
+  scale.segment<3>(JointLayout::kMean).setConstant(0.01);
+  scale.segment<6>(JointLayout::kScatter).setConstant(1e-4);
+  scale.segment<3>(JointLayout::kPlane) << 0.1, 0.1, 0.01;
+  return scale;
+}
+
+// The differences' own error: h^4 of a smooth function in units of its scale, h = 0.01,
+// times some tens for the fifth derivatives.
+constexpr double kTolerance = 1e-6;
+
+void
+expectJacobian(const Input& in)
+{
+  const BoundedPatch bounded = in.bound();
+  const Joint scale = jointScale(in.surface.model);
+  const auto parameters = [&](const Eigen::VectorXd& x) -> Eigen::VectorXd {
+    return pack(moved(in, scale.cwiseProduct(Joint(x))).bound().patch);
+  };
+  const Eigen::MatrixXd expected =
+      test::numericalJacobian(parameters,
+                              Eigen::VectorXd::Zero(JointLayout::kSize),
+                              1e-2);
+  const Eigen::MatrixXd actual = bounded.jacobian * scale.asDiagonal();
+  for (Eigen::Index row = 0; row < expected.rows(); ++row)
+    EXPECT_LT((actual.row(row) - expected.row(row)).cwiseAbs().maxCoeff(),
+              kTolerance * (expected.row(row).cwiseAbs().maxCoeff()))
+        << "row " << row << "\n"
+        << actual.row(row) << "\n"
+        << expected.row(row);
+}
+
+constexpr std::uint64_t kCases = 20;
+
+class BoundaryFit : public testing::TestWithParam<PatchType> {};
+
+TEST_P(BoundaryFit, JacobianIsTheDerivativeOfThePatch)
+{
+  const PatchType type = GetParam();
+  const Model model = modelOf(type.surface);
+  for (std::uint64_t i = 0; i < kCases; ++i) {
+    Random random(i);
+    Input in = randomInput(type, model, random);
+    in.smooth = i % 2 == 0;
+    in.has_plane = (model == Model::Sphere || model == Model::Cylinder) && i % 4 < 2;
+    expectJacobian(in);
+  }
+}
+
+TEST_P(BoundaryFit, PatchIsValidAndOnTheSurface)
+{
+  const Model model = modelOf(GetParam().surface);
+  for (std::uint64_t i = 0; i < kCases; ++i) {
+    Random random(i);
+    const Input in = randomInput(GetParam(), model, random);
+    const BoundedPatch bounded = in.bound();
+    if (bounded.status == FitStatus::CurvatureSignMismatch)
+      continue;
+    ASSERT_EQ(bounded.status, FitStatus::Converged);
+    EXPECT_EQ(validityError(bounded.patch), "");
+    const Patch again = canonical(bounded.patch);
+    EXPECT_LT((pack(again) - pack(bounded.patch)).cwiseAbs().maxCoeff(), 1e-12);
+    EXPECT_EQ(bounded.jacobian.rows(), degreesOfFreedom(GetParam()));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(AllTypes,
+                         BoundaryFit,
+                         testing::ValuesIn(kPatchTypes),
+                         test::patchTypeName);
+
+// A plane that the type tests made of a paraboloid keeps the paraboloid's parameters.
+TEST(BoundaryFitOfParaboloid, JacobianIsTheDerivativeOfThePlane)
+{
+  for (const PatchType type : kPatchTypes)
+    for (std::uint64_t i = 0; i < kCases && type.surface == SurfaceType::Plane; ++i) {
+      SCOPED_TRACE(test::typeName(type));
+      Random random(i);
+      expectJacobian(randomInput(type, Model::Paraboloid, random));
+    }
+}
+
+TEST(ContainmentFactors, EncloseTheShareOfAGaussian)
+{
+  for (const double share : {0.5, 0.9, 0.95, 0.999}) {
+    const ContainmentFactors factors = ContainmentFactors::of(share);
+    // Within +-lambda sigma on a line; within sqrt(2) factor sigma of a plane's centre.
+    EXPECT_NEAR(boost::math::erf(factors.lambda / std::sqrt(2.0)), share, 1e-14);
+    EXPECT_NEAR(1.0 - std::exp(-factors.plane * factors.plane), share, 1e-14);
+  }
+}
+
+TEST(BoundaryFitStatus, SignsThatContradictTheTypeAreReported)
+{
+  Random random;
+  for (const auto& [surface, sign] :
+       {std::pair(SurfaceType::EllipticParaboloid, -1.0),
+        std::pair(SurfaceType::HyperbolicParaboloid, 1.0)}) {
+    Input in = randomInput({surface, BoundaryType::Ellipse}, Model::Paraboloid, random);
+    in.surface.k = Eigen::Vector3d(sign * 3.0, 0.0, 5.0);
+    EXPECT_EQ(in.bound().status, FitStatus::CurvatureSignMismatch);
+    in.surface.k = Eigen::Vector3d(-sign * 3.0, 0.0, 5.0);
+    EXPECT_EQ(in.bound().status, FitStatus::Converged);
+  }
+}
+
+TEST(BoundaryFitStatus, ANormalAlongTheCylindersAxisLeavesNoDirectionForZ)
+{
+  Random random;
+  Input in = randomInput({SurfaceType::CircularCylinder, BoundaryType::Rectangle},
+                         Model::Cylinder,
+                         random);
+  in.has_plane = true;
+  in.plane.R = in.surface.R * expMap({0.0, 1.5707963267948966, 0.0});
+  EXPECT_EQ(in.bound().status, FitStatus::Degenerate);
+}
+
+TEST(BoundaryFitStatus, ANormalOppositeToTheWorldsZIsSingularForRevoluteTypes)
+{
+  Random random;
+  for (const PatchType type :
+       {PatchType{SurfaceType::CircularParaboloid, BoundaryType::Circle},
+        PatchType{SurfaceType::Plane, BoundaryType::Circle}}) {
+    Input in = randomInput(type, modelOf(type.surface), random);
+    in.surface.R = expMap({3.141592653589793, 0.0, 0.0});
+    EXPECT_EQ(in.bound().status, FitStatus::OrientationSingular);
+  }
+}
+
+}} // namespace holdfast

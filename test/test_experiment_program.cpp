@@ -1,0 +1,242 @@
+// `holdfast experiment`: every experiment in a short form, its files and its JSON.
+#include "support/run_program.h"
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace holdfast { namespace {
+
+using Json = nlohmann::json;
+using Names = std::vector<std::string>;
+
+class ExperimentProgram : public testing::Test {
+protected:
+  ExperimentProgram()
+  : folder_(test::freshFolder(
+        std::string("experiment_") +
+        testing::UnitTest::GetInstance()->current_test_info()->name()))
+  {}
+
+  test::ProgramRun experiment(Names arguments) const
+  {
+    arguments.insert(arguments.begin(), "experiment");
+    return test::runProgram(folder_, arguments);
+  }
+
+  /// Runs it with 20 trials and expects sound JSON and nothing else.
+  Json shortRun(const std::string& name, const Names& more = {}) const
+  {
+    Names arguments{name, "--trials", "20", "--seed", "5", "--json", "-"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const test::ProgramRun run = experiment(arguments);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_EQ(run.err, "");
+    const Json json = Json::parse(run.out, nullptr, false);
+    EXPECT_FALSE(json.is_discarded()) << run.out;
+    if (json.is_discarded())
+      return Json::object({{"rows", Json::array()}});
+    EXPECT_TRUE(json.at("holdfast").is_string());
+    EXPECT_EQ(json.at("experiment"), name);
+    EXPECT_EQ(json.at("seed"), 5);
+    EXPECT_EQ(json.at("trials"), 20);
+    const std::string command = json.at("command");
+    EXPECT_EQ(command.rfind("holdfast experiment " + name + " --trials 20 --seed 5", 0),
+              0u)
+        << command;
+    EXPECT_GT(json.at("rows").size(), 0u);
+    return json;
+  }
+
+  std::string folder_;
+};
+
+double
+relative(const Json& row, const std::string& a, const std::string& b)
+{
+  return row.at(a).get<double>() / row.at(b).get<double>();
+}
+
+TEST_F(ExperimentProgram, TableOneHasTenTypesInEveryColumn)
+{
+  const Json json = shortRun("table1");
+  // Five metrics of ten types, less the curvature of four planes.
+  ASSERT_EQ(json.at("rows").size(), 46u);
+  for (const Json& row : json.at("rows")) {
+    SCOPED_TRACE(row.dump());
+    for (const char* key : {"surface", "boundary", "metric", "unit"})
+      EXPECT_TRUE(row.at(key).is_string());
+    for (const std::string source : {"paper", "exact", "gauss_newton", "monte_carlo"}) {
+      EXPECT_TRUE(row.at(source + "_mean").is_number());
+      EXPECT_TRUE(row.at(source + "_variance").is_number());
+    }
+    EXPECT_EQ(row.at("squared_covariance_mean").is_null(),
+              row.at("surface").get<std::string>().find("paraboloid") ==
+                  std::string::npos);
+    // A mean of 20 distances has a standard error of about 15 % of itself. Spheres and
+    // cylinders of this scene spread more than first order says.
+    EXPECT_NEAR(relative(row, "exact_mean", "monte_carlo_mean"), 1.0, 0.7);
+  }
+}
+
+// What a first-order propagation worked out elsewhere gives for three paraboloids.
+TEST_F(ExperimentProgram, TableOneAgreesWithIndependentValues)
+{
+  struct Expected {
+    const char* surface;
+    const char* metric;
+    double mean;
+  };
+  const std::vector<Expected> expected{{"elliptic_paraboloid", "Phi_k", 0.165},
+                                       {"elliptic_paraboloid", "Phi_5", 0.087},
+                                       {"elliptic_paraboloid", "Phi_t", 0.056},
+                                       {"hyperbolic_paraboloid", "Phi_k", 0.151},
+                                       {"hyperbolic_paraboloid", "Phi_5", 0.046},
+                                       {"hyperbolic_paraboloid", "Phi_t", 0.026},
+                                       {"cylindric_paraboloid", "Phi_k", 0.141},
+                                       {"cylindric_paraboloid", "Phi_5", 0.035},
+                                       {"cylindric_paraboloid", "Phi_t", 0.026}};
+  const Json json = shortRun("table1");
+  for (const Expected& value : expected)
+    for (const Json& row : json.at("rows"))
+      if (row.at("surface") == value.surface && row.at("metric") == value.metric) {
+        // Theirs are at noisy fits, ours without noise: up to a sixth apart.
+        EXPECT_NEAR(row.at("exact_mean").get<double>() / value.mean, 1.0, 0.2)
+            << value.surface << ' ' << value.metric;
+      }
+}
+
+TEST_F(ExperimentProgram, ResultsDoNotDependOnTheNumberOfThreads)
+{
+  const Json one = shortRun("table1", {"--threads", "1"});
+  const Json three = shortRun("table1", {"--threads", "3"});
+  EXPECT_EQ(one, three);
+}
+
+TEST_F(ExperimentProgram, FigureFiveMovesTheSensorAlongThreeAxes)
+{
+  const Json json = shortRun("figure5");
+  double nearest = 0.0, farthest = 0.0;
+  for (const Json& row : json.at("rows")) {
+    SCOPED_TRACE(row.dump());
+    // From far aside the foreshortened patch shows no clear axis.
+    const double y = row.at("y");
+    EXPECT_EQ(row.at("status"),
+              std::abs(y) == 3.0 ? "axis_not_observable" : "converged");
+    EXPECT_TRUE(row.at("monte_carlo_Phi_t_mean").is_number());
+    if (row.at("axis") == "z")
+      (nearest == 0.0 ? nearest : farthest) = row.at("exact_Phi_k_mean");
+  }
+  // The paper's finding: uncertainty grows with distance.
+  EXPECT_GT(farthest, 2.0 * nearest);
+}
+
+TEST_F(ExperimentProgram, FigureSixHas150Patches)
+{
+  const Json json = shortRun("figure6");
+  int on_boulder = 0;
+  for (const Json& row : json.at("rows"))
+    if (row.at("rock") == "simulated boulder") {
+      ++on_boulder;
+      EXPECT_GT(row.at("Phi_t_mean").get<double>(), 0.0);
+    }
+  EXPECT_EQ(on_boulder, 150);
+}
+
+TEST_F(ExperimentProgram, NeighborhoodsShowThatSmallBallsCutTheNoise)
+{
+  const Json json = shortRun("neighborhoods");
+  for (const Json& row : json.at("rows")) {
+    if (row.at("radius_m") != 0.0126)
+      continue;
+    // 20 discs of 145 points: standard error 2.6 %.
+    if (row.at("neighborhood") == "disc") {
+      EXPECT_NEAR(row.at("chi2_per_dof").get<double>(), 1.0, 0.13);
+    }
+    if (row.at("neighborhood") == "ball") {
+      EXPECT_LT(row.at("chi2_per_dof").get<double>(), 0.85);
+    }
+  }
+}
+
+TEST_F(ExperimentProgram, NoiseJudgesTheModelsOnRecordedFrames)
+{
+  const std::string cloud = test::recordedCloud("mosd_static_learn17.pcd");
+  if (cloud.empty())
+    GTEST_SKIP() << "no recorded clouds (HOLDFAST_DATA_DIR)";
+  const Json json =
+      shortRun("noise",
+               {"--data", std::filesystem::path(cloud).parent_path().string()});
+  ASSERT_EQ(json.at("rows").size(), 6u);
+  const Json& stereo = json.at("rows").front();
+  EXPECT_EQ(stereo.at("model"), "stereo");
+  // The default sigmas are of the right size for one frame, and much too large for the
+  // change between frames.
+  EXPECT_GT(stereo.at("chi2_per_dof_whole_table").get<double>(), 0.3);
+  EXPECT_LT(stereo.at("chi2_per_dof_whole_table").get<double>(), 1.5);
+  EXPECT_LT(stereo.at("variance_ratio_across_frames").get<double>(), 0.3);
+  EXPECT_NE(json.at("remarks").dump().find("default sigmas"), std::string::npos);
+}
+
+TEST_F(ExperimentProgram, WritesTableAndFiles)
+{
+  const std::string out = folder_ + "/new/results";
+  const test::ProgramRun run =
+      experiment({"neighborhoods", "--trials", "3", "-o", out});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(run.out.find("chi2/dof"), std::string::npos);
+  EXPECT_EQ(test::filesIn(out),
+            (Names{"neighborhoods.csv", "neighborhoods.json", "neighborhoods.svg"}));
+  const std::string csv = test::readFile(out + "/neighborhoods.csv");
+  EXPECT_EQ(csv.rfind("neighborhood,radius_m,points,", 0), 0u);
+  const Json json = Json::parse(test::readFile(out + "/neighborhoods.json"));
+  EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')),
+            json.at("rows").size() + 1);
+  const std::string svg = test::readFile(out + "/neighborhoods.svg");
+  EXPECT_EQ(svg.rfind("<svg ", 0), 0u);
+  EXPECT_NE(svg.find("radius (m)"), std::string::npos);
+  EXPECT_EQ(svg.find("nan"), std::string::npos);
+  EXPECT_EQ(svg.find("inf"), std::string::npos);
+}
+
+TEST_F(ExperimentProgram, SaysInOneLineWhatIsWrong)
+{
+  const Names no_files{};
+  for (const Names& arguments :
+       std::vector<Names>{{},
+                          {"nonsense"},
+                          {"table1", "--trials", "1"},
+                          {"table1", "--seed", "-1"},
+                          {"table1", "--frobnicate"},
+                          {"noise", "--data", folder_ + "/missing"}}) {
+    const test::ProgramRun run = experiment(arguments);
+    EXPECT_EQ(run.exit_code, 2) << run.err;
+    EXPECT_EQ(run.errorLines(), 1) << run.err;
+    EXPECT_EQ(run.out, "");
+  }
+  for (const Names& arguments : std::vector<Names>{
+           {"noise", "--data", folder_},
+           {"table1", "--trials", "2", "-o", "/dev/null/results"},
+           {"table1", "--trials", "2", "--json", folder_ + "/no/file"}}) {
+    const test::ProgramRun run = experiment(arguments);
+    EXPECT_EQ(run.exit_code, 1) << run.err;
+    EXPECT_EQ(run.errorLines(), 1) << run.err;
+  }
+  EXPECT_EQ(test::filesIn(folder_), no_files);
+}
+
+TEST_F(ExperimentProgram, NoiseNeedsAFolder)
+{
+  ::unsetenv("HOLDFAST_DATA_DIR");
+  const test::ProgramRun run = experiment({"noise"});
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_NE(run.err.find("--data"), std::string::npos);
+}
+
+}} // namespace holdfast

@@ -1,0 +1,145 @@
+// A batch that is refilled and an estimator that is reused take no memory from the
+// heap: this program counts every allocation, its libraries' included.
+#include "support/patch_batch.h"
+#include "support/random_patch.h"
+
+#include <holdfast/uncertainty/covariance.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstddef>
+#include <cstdlib>
+
+// A sanitizer puts its own functions before the C library's.
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#define HOLDFAST_COUNTS_ALLOCATIONS 1
+#endif
+
+namespace {
+
+std::atomic<long> allocations{0};
+
+} // namespace
+
+#ifdef HOLDFAST_COUNTS_ALLOCATIONS
+
+extern "C" {
+
+void* __libc_malloc(std::size_t size);
+void* __libc_calloc(std::size_t count, std::size_t size);
+void* __libc_realloc(void* pointer, std::size_t size);
+void* __libc_memalign(std::size_t alignment, std::size_t size);
+
+// These stand before the C library's of the same name; `operator new` ends in them.
+void*
+malloc(std::size_t size)
+{
+  ++allocations;
+  return __libc_malloc(size);
+}
+
+void*
+calloc(std::size_t count, std::size_t size)
+{
+  ++allocations;
+  return __libc_calloc(count, size);
+}
+
+void*
+realloc(void* pointer, std::size_t size)
+{
+  ++allocations;
+  return __libc_realloc(pointer, size);
+}
+
+void*
+aligned_alloc(std::size_t alignment, std::size_t size)
+{
+  ++allocations;
+  return __libc_memalign(alignment, size);
+}
+
+int
+posix_memalign(void** pointer, std::size_t alignment, std::size_t size)
+{
+  ++allocations;
+  *pointer = __libc_memalign(alignment, size);
+  return *pointer ? 0 : ENOMEM;
+}
+}
+
+#endif
+
+namespace holdfast { namespace {
+
+using test::Random;
+
+class FitAllocation : public testing::TestWithParam<PatchType> {
+protected:
+  void SetUp() override
+  {
+#ifndef HOLDFAST_COUNTS_ALLOCATIONS
+    GTEST_SKIP() << "allocations cannot be counted under a sanitizer";
+#endif
+  }
+};
+
+// Allocations of three rounds over the samples after a first one. The estimator reads
+// from batches that it refills; filling and fitting both count.
+long
+allocationsInSteadyState(const std::vector<test::Sample>& samples,
+                         const PatchEstimator& estimator)
+{
+  PointBatch batch;
+  long before = 0;
+  int usable = 0;
+  for (int round = 0; round < 4; ++round) {
+    if (round == 1)
+      before = allocations;
+    for (const test::Sample& sample : samples) {
+      test::fillBatch(sample, batch);
+      usable += isUsable(estimator.estimate(batch).status);
+    }
+  }
+  const long count = allocations - before;
+  EXPECT_EQ(usable, 4 * static_cast<int>(samples.size()));
+  return count;
+}
+
+TEST_P(FitAllocation, NoneInSteadyState)
+{
+  Random random;
+  std::vector<test::Sample> samples;
+  for (int i = 0; i < 5; ++i) {
+    samples.push_back(test::robotSample(GetParam(), 0.5, random));
+    // Every normal on the same side.
+    samples.back().viewpoint = {0.0, 0.0, 1.0};
+  }
+  FitOptions ray, paper = FitOptions::paper();
+  ray.residual = Residual::Ray;
+  for (FitOptions options : {FitOptions{}, ray, paper})
+    for (const CovarianceMode mode :
+         {CovarianceMode::Exact, CovarianceMode::GaussNewton}) {
+      options.viewpoint = samples.front().viewpoint;
+      const PatchEstimator estimator(test::optionsFor(GetParam(), options), mode);
+      EXPECT_EQ(allocationsInSteadyState(samples, estimator), 0);
+    }
+}
+
+TEST_P(FitAllocation, IsCounted)
+{
+  const long before = allocations;
+  EXPECT_NE(
+      std::vector<int>(GetParam().surface == SurfaceType::Plane ? 10U : 20U).data(),
+      nullptr);
+  PointBatch batch;
+  batch.reserve(100);
+  EXPECT_EQ(allocations - before, 2);
+}
+
+INSTANTIATE_TEST_SUITE_P(AllTypes,
+                         FitAllocation,
+                         testing::ValuesIn(kPatchTypes),
+                         test::patchTypeName);
+
+}} // namespace holdfast
