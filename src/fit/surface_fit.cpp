@@ -346,13 +346,18 @@ statusOf(LevenbergMarquardtSummary::Stop stop)
   return FitStatus::NonFinite;
 }
 
-// Exact Newton steps; the sums of the last one also give the covariance.
+// Exact Newton steps; the sums of the last one also give the covariance. Newton is
+// blind to the cost: where it climbs away from the start, the start is kept.
 void
 polish(const SurfaceProblem& problem,
        const FitOptions& options,
        SurfaceFit& fit,
        NullSpace& null_space)
 {
+  // More than rounding, less than matters: half a unit of chi-square.
+  constexpr double kClimb = 0.25;
+  const UnboundedSurface start = fit.surface;
+  const double start_cost = fit.cost;
   kernel::CovarianceSums sums;
   for (fit.polish_steps = 1; fit.polish_steps <= kMaxPolishSteps; ++fit.polish_steps) {
     kernel::accumulateCovariance(problem.model,
@@ -366,6 +371,8 @@ polish(const SurfaceProblem& problem,
       fit.status = FitStatus::NonFinite;
       return;
     }
+    if (sums.cost > start_cost + kClimb)
+      break;
     const Eigen::LLT<ThetaMatrix> cholesky(fit.linearization.H);
     if (cholesky.info() != Eigen::Success ||
         smallestPivot(fit.linearization.H, problem.model) < kSmallestPivot) {
@@ -382,6 +389,8 @@ polish(const SurfaceProblem& problem,
       return;
     }
   }
+  fit.surface = start;
+  fit.cost = start_cost;
   fit.status = FitStatus::IterationLimit;
 }
 
@@ -395,6 +404,23 @@ setAxes(const Eigen::Vector3d& towards, Scatter& scatter)
   scatter.axes.col(2) = n.dot(towards) < 0.0 ? Eigen::Vector3d(-n) : n;
   scatter.axes.col(0) = solver.eigenvectors().col(2);
   scatter.axes.col(1) = scatter.axes.col(2).cross(scatter.axes.col(0));
+}
+
+// Brings the surface near the solution by the Sampson residual: cheaper than the ray
+// residual and, where rays from a poor start would miss the surface, without its false
+// minima. The two solutions are within half a sigma of each other.
+// \return iterations.
+int
+approach(SurfaceProblem problem, const FitOptions& options, UnboundedSurface& surface)
+{
+  constexpr double kNear = 0.3; // sigmas
+  problem.residual = Residual::Sampson;
+  SurfaceProblem::Evaluation evaluation;
+  return levenbergMarquardt(problem,
+                            {options.max_iterations, kNear},
+                            surface,
+                            evaluation)
+      .iterations;
 }
 
 } // namespace
@@ -528,10 +554,12 @@ fitSurface(kernel::Model model,
   SurfaceFit fit;
   fit.surface = surfaceStart(model, options.residual, problem.points, scatter);
   SurfaceProblem::Evaluation evaluation;
+  if (options.residual == Residual::Ray && model != Model::Plane)
+    fit.iterations = approach(problem, options, fit.surface);
   const LevenbergMarquardtOptions lm{options.max_iterations,
                                      options.step_tolerance_sigma};
   const auto summary = levenbergMarquardt(problem, lm, fit.surface, evaluation);
-  fit.iterations = summary.iterations;
+  fit.iterations += summary.iterations;
   fit.status = statusOf(summary.stop);
   fit.cost = evaluation.cost;
   fit.JtJ = evaluation.JtJ;

@@ -49,6 +49,7 @@ levenbergMarquardt(const Problem& problem,
     return summary;
   }
   double damping = 0.0;
+  bool rejected = false; // since the last accepted step
   typename Problem::Evaluation trial;
   while (true) {
     auto damped = evaluation.JtJ;
@@ -79,9 +80,14 @@ levenbergMarquardt(const Problem& problem,
     if (trial.cost <= evaluation.cost * (1.0 + kRounding)) {
       state = candidate;
       evaluation = trial;
-      damping = damping <= kFirstDamping ? 0.0 : damping / 10.0;
+      // Where damping was needed just now, it will be again: lower it only after a step
+      // that was accepted at once.
+      if (!rejected)
+        damping = damping <= kFirstDamping ? 0.0 : damping / 10.0;
+      rejected = false;
     }
     else {
+      rejected = true;
       damping = std::max(10.0 * damping, kFirstDamping);
       if (damping > kLargestDamping) {
         // No step in any direction lowers the cost: rounding is all that is left.
