@@ -1,0 +1,92 @@
+// Are the covariances right? Monte Carlo on the robot scenes, defaults and exact mode.
+#include "support/patch_batch.h"
+
+#include <holdfast/uncertainty/calibration.h>
+
+#include <gtest/gtest.h>
+
+namespace holdfast { namespace {
+
+using test::Random;
+using test::typeName;
+
+// NEES/dof of n trials has a standard deviation of sqrt(2 / (dof n)), at most 0.0105
+// for the 6 parameters of the plane circle; a sigma ratio one of sqrt(1 / (2 n)) =
+// 0.013; a bias one of sqrt(1 / n) = 0.018. The bounds leave three of each, so that a
+// wrong sigma of 5 % fails.
+constexpr int kTrials = 3000;
+
+class Calibration : public testing::TestWithParam<PatchType> {
+protected:
+  CalibrationResult run(double distance,
+                        double tilt,
+                        double azimuth,
+                        std::uint64_t seed) const
+  {
+    const CalibrationScene scene = robotScene(GetParam(), distance, tilt, azimuth);
+    CalibrationOptions options;
+    options.trials = kTrials;
+    options.seed = seed;
+    options.count_type_errors = true;
+    return calibrate(scene.scene, scene.rays, test::kinectNoise(), options);
+  }
+
+  static void expectRight(const CalibrationResult& result)
+  {
+    EXPECT_GE(result.nees_per_dof, 0.97);
+    EXPECT_LE(result.nees_per_dof, 1.06);
+    EXPECT_GE(result.coverage95, 0.92);
+    EXPECT_LE(result.coverage95, 0.96);
+    for (const double ratio : result.sigma_ratio) {
+      EXPECT_GE(ratio, 0.95);
+      EXPECT_LE(ratio, 1.06);
+    }
+    for (const double bias : result.bias_after_shift_sigma)
+      EXPECT_LE(std::abs(bias), 0.1);
+    EXPECT_EQ(result.failure_rate, 0.0);
+  }
+};
+
+TEST_P(Calibration, CovariancesAreRightAtEightyCentimetres)
+{
+  Random random;
+  expectRight(run(0.8, 0.5, 0.6, random.seed()));
+}
+
+TEST_P(Calibration, CovariancesAreRightFromAnyViewpoint)
+{
+  Random random;
+  const double distance = random.uniform(0.8, 0.9);
+  const double tilt = random.uniform(0.2, 0.8);
+  expectRight(run(distance, tilt, random.uniform(0.0, 6.28), random.seed()));
+}
+
+TEST_P(Calibration, TypesAreToldApart)
+{
+  const SurfaceType surface = GetParam().surface;
+  const bool told = isParaboloid(surface) || GetParam() == PatchType{};
+  if (!told)
+    GTEST_SKIP() << "this type is asked for, not found";
+  Random random;
+  EXPECT_LE(run(1.2, 0.5, 0.6, random.seed()).type_error_rate, 0.04);
+}
+
+TEST_P(Calibration, DoesNotDependOnTheNumberOfThreads)
+{
+  const CalibrationScene scene = robotScene(GetParam(), 1.0, 0.5, 0.6);
+  CalibrationOptions options;
+  options.trials = 20;
+  options.threads = 1;
+  const auto one = calibrate(scene.scene, scene.rays, test::kinectNoise(), options);
+  options.threads = 3;
+  const auto three = calibrate(scene.scene, scene.rays, test::kinectNoise(), options);
+  EXPECT_EQ(one.nees_per_dof, three.nees_per_dof);
+  EXPECT_EQ(one.sigma_ratio, three.sigma_ratio);
+}
+
+INSTANTIATE_TEST_SUITE_P(AllTypes,
+                         Calibration,
+                         testing::ValuesIn(kPatchTypes),
+                         [](const auto& info) { return typeName(info.param); });
+
+}} // namespace holdfast
