@@ -67,28 +67,6 @@ fillBatch(const std::vector<Eigen::Vector3d>& points,
   }
 }
 
-SurfaceRequest
-requestFor(SurfaceType surface)
-{
-  switch (surface) {
-  case SurfaceType::Plane:
-    return SurfaceRequest::Plane;
-  case SurfaceType::Sphere:
-    return SurfaceRequest::Sphere;
-  case SurfaceType::CircularCylinder:
-    return SurfaceRequest::CircularCylinder;
-  case SurfaceType::EllipticParaboloid:
-    return SurfaceRequest::EllipticParaboloid;
-  case SurfaceType::HyperbolicParaboloid:
-    return SurfaceRequest::HyperbolicParaboloid;
-  case SurfaceType::CylindricParaboloid:
-    return SurfaceRequest::CylindricParaboloid;
-  case SurfaceType::CircularParaboloid:
-    break;
-  }
-  return SurfaceRequest::CircularParaboloid;
-}
-
 // Error of a patch in the tangent space [d | k | delta | c] of the reference.
 ParameterVector
 tangentError(const Patch& patch, const Patch& reference)
@@ -304,11 +282,7 @@ calibrate(const Scene& scene,
   const TruePoints truth = truePoints(scene, rays, noise, options.noise_scale);
   if (truth.points.empty())
     throw std::invalid_argument("the sensor does not see the patch");
-  FitOptions fit = options.fit;
-  fit.surface = requestFor(type.surface);
-  fit.plane_boundary.reset();
-  if (type.surface == SurfaceType::Plane)
-    fit.plane_boundary = type.boundary;
+  FitOptions fit = withType(options.fit, type);
   fit.viewpoint = truth.sensor_pose.c;
 
   const TrialRunner runner(truth, noise, fit, type, options);

@@ -121,36 +121,11 @@ normalizedDifference(const ParameterMatrix& A, const ParameterMatrix& B)
   return largest;
 }
 
-/// The request that forces a type, so that no test decides.
-inline SurfaceRequest
-requestFor(SurfaceType surface)
-{
-  switch (surface) {
-  case SurfaceType::Plane:
-    return SurfaceRequest::Plane;
-  case SurfaceType::Sphere:
-    return SurfaceRequest::Sphere;
-  case SurfaceType::CircularCylinder:
-    return SurfaceRequest::CircularCylinder;
-  case SurfaceType::EllipticParaboloid:
-    return SurfaceRequest::EllipticParaboloid;
-  case SurfaceType::HyperbolicParaboloid:
-    return SurfaceRequest::HyperbolicParaboloid;
-  case SurfaceType::CylindricParaboloid:
-    return SurfaceRequest::CylindricParaboloid;
-  case SurfaceType::CircularParaboloid:
-    break;
-  }
-  return SurfaceRequest::CircularParaboloid;
-}
-
+/// Options that force a type, so that no test decides.
 inline FitOptions
-optionsFor(PatchType type, FitOptions options = {})
+optionsFor(PatchType type, const FitOptions& options = {})
 {
-  options.surface = requestFor(type.surface);
-  if (type.surface == SurfaceType::Plane)
-    options.plane_boundary = type.boundary;
-  return options;
+  return withType(options, type);
 }
 
 inline std::string

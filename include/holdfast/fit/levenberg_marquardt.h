@@ -22,6 +22,41 @@ struct LevenbergMarquardtSummary {
   int iterations = 0;
 };
 
+/// Factor by which the diagonal is raised: none as long as plain Gauss-Newton works.
+class Damping {
+public:
+  static constexpr double kFirst = 1e-3, kLargest = 1e12;
+
+  double value() const
+  {
+    return value_;
+  }
+
+  bool exhausted() const
+  {
+    return value_ > kLargest;
+  }
+
+  void raise()
+  {
+    raised_ = true;
+    value_ = std::max(10.0 * value_, kFirst);
+  }
+
+  /// After an accepted step. Where damping was needed just now, it will be again: lower
+  /// it only after a step that was accepted at once.
+  void lower()
+  {
+    if (!raised_)
+      value_ = value_ <= kFirst ? 0.0 : value_ / 10.0;
+    raised_ = false;
+  }
+
+private:
+  double value_ = 0.0;
+  bool raised_ = false; // since the last accepted step
+};
+
 /// Minimises a cost that the problem evaluates.
 ///
 /// Problem has: `State`; `Evaluation` with members `cost`, `gradient` (n) and `JtJ`
@@ -38,7 +73,6 @@ levenbergMarquardt(const Problem& problem,
                    typename Problem::Evaluation& evaluation)
 {
   using Stop = LevenbergMarquardtSummary::Stop;
-  constexpr double kFirstDamping = 1e-3, kLargestDamping = 1e12;
   // Costs agree within rounding near the minimum, where a step may not lower them.
   constexpr double kRounding = 1e-12;
 
@@ -48,23 +82,23 @@ levenbergMarquardt(const Problem& problem,
     summary.stop = Stop::NonFinite;
     return summary;
   }
-  double damping = 0.0;
-  bool rejected = false; // since the last accepted step
+  Damping damping;
   typename Problem::Evaluation trial;
   while (true) {
     auto damped = evaluation.JtJ;
-    damped.diagonal() *= 1.0 + damping;
+    damped.diagonal() *= 1.0 + damping.value();
     const auto cholesky = damped.llt();
     if (cholesky.info() != Eigen::Success) {
       summary.stop = Stop::Singular;
-      if (damping >= kLargestDamping)
+      if (damping.exhausted())
         return summary;
-      damping = std::max(10.0 * damping, kFirstDamping);
+      damping.raise();
       continue;
     }
     const auto step = (-cholesky.solve(evaluation.gradient)).eval();
     const double decrement = std::sqrt(std::max(0.0, -step.dot(evaluation.gradient)));
-    if (decrement < options.step_tolerance_sigma && damping <= kFirstDamping) {
+    if (decrement < options.step_tolerance_sigma &&
+        damping.value() <= Damping::kFirst) {
       // The last step is worth taking, but not another evaluation.
       state = problem.retract(state, step);
       summary.stop = Stop::Converged;
@@ -80,16 +114,11 @@ levenbergMarquardt(const Problem& problem,
     if (trial.cost <= evaluation.cost * (1.0 + kRounding)) {
       state = candidate;
       evaluation = trial;
-      // Where damping was needed just now, it will be again: lower it only after a step
-      // that was accepted at once.
-      if (!rejected)
-        damping = damping <= kFirstDamping ? 0.0 : damping / 10.0;
-      rejected = false;
+      damping.lower();
     }
     else {
-      rejected = true;
-      damping = std::max(10.0 * damping, kFirstDamping);
-      if (damping > kLargestDamping) {
+      damping.raise();
+      if (damping.exhausted()) {
         // No step in any direction lowers the cost: rounding is all that is left.
         summary.stop = Stop::Converged;
         return summary;
