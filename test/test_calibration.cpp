@@ -87,6 +87,6 @@ TEST_P(Calibration, DoesNotDependOnTheNumberOfThreads)
 INSTANTIATE_TEST_SUITE_P(AllTypes,
                          Calibration,
                          testing::ValuesIn(kPatchTypes),
-                         [](const auto& info) { return typeName(info.param); });
+                         [](const auto& tested) { return typeName(tested.param); });
 
 }} // namespace holdfast
