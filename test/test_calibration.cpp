@@ -12,8 +12,9 @@ using test::typeName;
 
 // NEES/dof of n trials has a standard deviation of sqrt(2 / (dof n)), at most 0.0105
 // for the 6 parameters of the plane circle; a sigma ratio one of sqrt(1 / (2 n)) =
-// 0.013; a bias one of sqrt(1 / n) = 0.018. The bounds leave three of each, so that a
-// wrong sigma of 5 % fails.
+// 0.013; a bias one of sqrt(1 / n) = 0.018. The bounds are those of the requirement,
+// two or more of these away from right: sigmas that are 5 % off move the NEES by 10 %,
+// and fail.
 constexpr int kTrials = 3000;
 
 class Calibration : public testing::TestWithParam<PatchType> {

@@ -407,7 +407,7 @@ setAxes(const Eigen::Vector3d& towards, Scatter& scatter)
 }
 
 // Brings the surface near the solution by the Sampson residual: cheaper than the ray
-// residual and, where rays from a poor start would miss the surface, without its false
+// residual and, where rays from a poor start would miss the surface, with fewer false
 // minima. The two solutions are within half a sigma of each other.
 // \return iterations.
 int

@@ -16,9 +16,8 @@ enum class CovarianceMode : std::uint8_t {
   Exact,
   /// As Exact, with J^T J in place of the Hessian.
   GaussNewton,
-  /// Exact, plus the second-order terms of the stages after the fit: covariance and
-  /// mean
-  /// shift (holdfast/uncertainty/second_order.h). For few points and strong noise.
+  /// Exact, plus the second-order terms of the stages after the fit, with the shift of
+  /// the mean (holdfast/uncertainty/second_order.h). For few points and strong noise.
   SecondOrder,
   /// The paper's chain with its independence assumptions, to compare
   /// (holdfast/uncertainty/stagewise.h).
