@@ -423,6 +423,72 @@ approach(SurfaceProblem problem, const FitOptions& options, UnboundedSurface& su
       .iterations;
 }
 
+// Damped Gauss-Newton steps, then exact Newton steps, from fit.surface.
+void
+descend(const SurfaceProblem& problem,
+        const FitOptions& options,
+        SurfaceFit& fit,
+        NullSpace& null_space)
+{
+  SurfaceProblem::Evaluation evaluation;
+  const LevenbergMarquardtOptions lm{options.max_iterations,
+                                     options.step_tolerance_sigma};
+  const auto summary = levenbergMarquardt(problem, lm, fit.surface, evaluation);
+  fit.iterations += summary.iterations;
+  fit.status = statusOf(summary.stop);
+  fit.cost = evaluation.cost;
+  fit.JtJ = evaluation.JtJ;
+  if (!evaluation.JtJ.allFinite())
+    fit.status = FitStatus::NonFinite;
+  if (fit.status != FitStatus::NonFinite &&
+      smallestPivot(evaluation.JtJ, problem.model) < kSmallestPivot) {
+    fit.status = FitStatus::Degenerate;
+    null_space = nullSpaceOf(evaluation.JtJ, problem.model);
+  }
+  // Where residuals are large, Gauss-Newton may circle the minimum that Newton then
+  // finds.
+  if (fit.status == FitStatus::Converged || fit.status == FitStatus::IterationLimit)
+    polish(problem, options, fit, null_space);
+}
+
+// Of two fits to the same points; the former one where they agree within rounding.
+bool
+isBetter(const SurfaceFit& later, const SurfaceFit& former)
+{
+  constexpr double kRounding = 1e-6; // of half a chi-square
+  const bool converged = later.status == FitStatus::Converged;
+  if (converged != (former.status == FitStatus::Converged))
+    return converged;
+  return later.cost < former.cost - kRounding;
+}
+
+// Spheres and cylinders of which much more than a cap is seen. Every ray that meets a
+// ball meets a larger one through the same apex; past a smaller one they go, and a fit
+// that starts there may never find them again. So start from flatter surfaces, two of
+// them, since the cost has several minima where rays graze the silhouette.
+SurfaceFit
+fitThick(const SurfaceProblem& problem,
+         const FitOptions& options,
+         const UnboundedSurface& start,
+         NullSpace& null_space)
+{
+  const auto fitFlattened = [&](double share_of_curvature, NullSpace& undetermined) {
+    SurfaceFit fit;
+    fit.surface = start;
+    fit.surface.k *= share_of_curvature;
+    descend(problem, options, fit, undetermined);
+    return fit;
+  };
+  SurfaceFit best = fitFlattened(0.8, null_space);
+  NullSpace undetermined(6, 0);
+  const SurfaceFit other = fitFlattened(0.65, undetermined);
+  if (isBetter(other, best)) {
+    best = other;
+    null_space = undetermined;
+  }
+  return best;
+}
+
 } // namespace
 
 UnboundedSurface
@@ -551,29 +617,15 @@ fitSurface(kernel::Model model,
            NullSpace& null_space)
 {
   const SurfaceProblem problem{model, options.residual, kernelPoints(batch), scatter};
+  const UnboundedSurface start =
+      surfaceStart(model, options.residual, problem.points, scatter);
+  if (isThick(model, scatter))
+    return fitThick(problem, options, start, null_space);
   SurfaceFit fit;
-  fit.surface = surfaceStart(model, options.residual, problem.points, scatter);
-  SurfaceProblem::Evaluation evaluation;
+  fit.surface = start;
   if (options.residual == Residual::Ray && model != Model::Plane)
     fit.iterations = approach(problem, options, fit.surface);
-  const LevenbergMarquardtOptions lm{options.max_iterations,
-                                     options.step_tolerance_sigma};
-  const auto summary = levenbergMarquardt(problem, lm, fit.surface, evaluation);
-  fit.iterations += summary.iterations;
-  fit.status = statusOf(summary.stop);
-  fit.cost = evaluation.cost;
-  fit.JtJ = evaluation.JtJ;
-  if (!evaluation.JtJ.allFinite())
-    fit.status = FitStatus::NonFinite;
-  if (fit.status != FitStatus::NonFinite &&
-      smallestPivot(evaluation.JtJ, model) < kSmallestPivot) {
-    fit.status = FitStatus::Degenerate;
-    null_space = nullSpaceOf(evaluation.JtJ, model);
-  }
-  // Where residuals are large, Gauss-Newton may circle the minimum that Newton then
-  // finds.
-  if (fit.status == FitStatus::Converged || fit.status == FitStatus::IterationLimit)
-    polish(problem, options, fit, null_space);
+  descend(problem, options, fit, null_space);
   return fit;
 }
 

@@ -200,6 +200,16 @@ tryAlgebraicStarts(Residual residual,
 
 } // namespace
 
+bool
+isThick(Model model, const Scatter& scatter)
+{
+  // A cap of half-angle t has eigenvalues in the ratio t^2/12 or so: beyond some 25
+  // degrees a height field misrepresents it.
+  constexpr double kThick = 0.015;
+  return (model == Model::Sphere || model == Model::Cylinder) &&
+         scatter.eigenvalues[0] > kThick * scatter.eigenvalues[2];
+}
+
 UnboundedSurface
 surfaceStart(Model model,
              Residual residual,
@@ -215,11 +225,7 @@ surfaceStart(Model model,
   surface = surfaceFromQuadric(model, leastSquaresQuadric(points, scatter), scatter);
   if (model == Model::Cylinder)
     alignCylinder(surface);
-  // A cap of half-angle t has eigenvalues in the ratio t^2/12 or so: beyond some 25
-  // degrees a height field misrepresents it.
-  constexpr double kThick = 0.015;
-  const bool thick = scatter.eigenvalues[0] > kThick * scatter.eigenvalues[2];
-  if (thick && model != Model::Paraboloid)
+  if (isThick(model, scatter))
     tryAlgebraicStarts(residual, points, scatter, surface);
   return surface;
 }

@@ -16,9 +16,12 @@ struct Quadric {
 // the quadric.
 Quadric leastSquaresQuadric(const kernel::Points& points, const Scatter& scatter);
 
+// Whether the points wrap around a sphere or cylinder too far for a height field.
+bool isThick(kernel::Model model, const Scatter& scatter);
+
 // A start about one sigma from the solution: the least-squares quadric over the
-// principal frame. Where the points wrap around a sphere or cylinder too far for a
-// height field, algebraic fits compete with it and the lowest cost wins.
+// principal frame. Where that is too thick, algebraic fits compete with it and the
+// lowest cost wins.
 UnboundedSurface surfaceStart(kernel::Model model,
                               Residual residual,
                               const kernel::Points& points,
