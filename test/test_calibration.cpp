@@ -29,7 +29,31 @@ protected:
     options.trials = kTrials;
     options.seed = seed;
     options.count_type_errors = true;
+    return run(scene, options);
+  }
+
+  static CalibrationResult run(const CalibrationScene& scene,
+                               const CalibrationOptions& options)
+  {
     return calibrate(scene.scene, scene.rays, test::kinectNoise(), options);
+  }
+
+  // The paper's scene, second order. The sphere is seen to its silhouette: where rays
+  // graze it the cost is anything but quadratic, and one fit in a hundred settles far
+  // away; 1.64 is measured where 1.6 is the aim.
+  static double largestFarNees(PatchType type)
+  {
+    switch (type.surface) {
+    case SurfaceType::Plane:
+      return 1.06;
+    case SurfaceType::EllipticParaboloid:
+    case SurfaceType::CircularParaboloid:
+      return 1.6;
+    case SurfaceType::Sphere:
+      return 1.75;
+    default:
+      return 1.2;
+    }
   }
 
   static void expectRight(const CalibrationResult& result)
@@ -83,6 +107,66 @@ TEST_P(Calibration, DoesNotDependOnTheNumberOfThreads)
   const auto three = calibrate(scene.scene, scene.rays, test::kinectNoise(), options);
   EXPECT_EQ(one.nees_per_dof, three.nees_per_dof);
   EXPECT_EQ(one.sigma_ratio, three.sigma_ratio);
+}
+
+// With a tenth of the noise first order is nearly all there is: what is left comes from
+// the coarse sampling of the paper's scene, and from the Sampson residual's own bias,
+// which is no matter of the covariance.
+TEST_P(Calibration, FirstOrderIsExactForLittleNoise)
+{
+  Random random;
+  for (const Residual residual : {Residual::Sampson, Residual::Ray}) {
+    SCOPED_TRACE(residual == Residual::Ray ? "ray" : "sampson");
+    CalibrationOptions options;
+    options.trials = kTrials;
+    options.seed = random.seed();
+    options.noise_scale = 0.1;
+    options.fit.residual = residual;
+    const auto nees = [&](const CalibrationScene& scene) {
+      const CalibrationResult result = run(scene, options);
+      return residual == Residual::Ray ? result.nees_per_dof :
+                                         result.nees_per_dof_about_mean;
+    };
+    const double robot = nees(robotScene(GetParam(), 1.0, 0.5, 0.6));
+    EXPECT_GE(robot, 0.95);
+    EXPECT_LE(robot, 1.05);
+    const double far = nees(tableTwoScene(GetParam()));
+    EXPECT_GE(far, 0.95);
+    EXPECT_LE(far, 1.13);
+  }
+}
+
+TEST_P(Calibration, SecondOrderHoldsFromFartherAway)
+{
+  Random random;
+  CalibrationOptions options;
+  options.trials = 2 * kTrials;
+  options.seed = random.seed();
+  options.mode = CovarianceMode::SecondOrder;
+  for (const double distance : {0.8, 1.0, 1.2}) {
+    SCOPED_TRACE("distance " + std::to_string(distance) + " m");
+    const double nees =
+        run(robotScene(GetParam(), distance, 0.5, 0.6), options).nees_per_dof;
+    EXPECT_NEAR(nees, 1.0, distance > 1.0 ? 0.04 : 0.03);
+  }
+  // Noise of 7 to 15 cm on patches of 1.5 m.
+  const double far = run(tableTwoScene(GetParam()), options).nees_per_dof;
+  EXPECT_GE(far, 0.97);
+  EXPECT_LE(far, largestFarNees(GetParam()));
+}
+
+TEST_P(Calibration, ThePapersChoicesAreNearlyRightAboutTheirMean)
+{
+  Random random;
+  CalibrationOptions options;
+  options.trials = kTrials;
+  options.seed = random.seed();
+  options.fit = FitOptions::paper();
+  const double nees =
+      run(robotScene(GetParam(), 1.0, 0.5, 0.6), options).nees_per_dof_about_mean;
+  EXPECT_GE(nees, 0.95);
+  // The larger of two equal moments is no smooth function of them.
+  EXPECT_LE(nees, GetParam().boundary == BoundaryType::Circle ? 1.45 : 1.12);
 }
 
 INSTANTIATE_TEST_SUITE_P(AllTypes,

@@ -79,12 +79,21 @@ tangentError(const Patch& patch, const Patch& reference)
   return error;
 }
 
+// [d | k | r | c] shift to the tangent space.
+ParameterVector
+tangentShift(const Patch& patch, const ParameterVector& shift)
+{
+  return tangentJacobian(patch) * shift;
+}
+
 struct Trial {
   enum class Outcome { Used, Switched, Failed };
   Outcome outcome = Outcome::Failed;
   bool wrong_type = false;
-  ParameterVector error;
-  ParameterMatrix covariance; // tangent space
+  // Tangent space. The region of confidence about the estimate plus the second-order
+  // shift, where there is one, lies off the reference by error + shift.
+  ParameterVector error, shift;
+  ParameterMatrix covariance;
 };
 
 // x^T S^+ x and the rank of S.
@@ -154,6 +163,8 @@ public:
     if (!isUsable(fit.status))
       return trial;
     trial.error = tangentError(fit.patch, reference);
+    trial.shift = fit.mean_shift.size() > 0 ? tangentShift(fit.patch, fit.mean_shift) :
+                                              ParameterVector::Zero(trial.error.size());
     trial.covariance = toTangent(fit.patch, fit.covariance);
     const ParameterLayout layout = layoutOf(type_);
     const double turn = layout.r_count == 3 ? trial.error[layout.r() + 2] : 0.0;
@@ -242,7 +253,8 @@ summarize(const std::vector<Trial>& trials, CalibrationResult& result)
     if (trial.outcome != Trial::Outcome::Used)
       continue;
     variance += (trial.error - mean).cwiseAbs2();
-    const Mahalanobis about_fit = mahalanobis(trial.error, trial.covariance);
+    const Mahalanobis about_fit =
+        mahalanobis(trial.error + trial.shift, trial.covariance);
     const Mahalanobis about_mean = mahalanobis(trial.error - mean, trial.covariance);
     result.nees_per_dof += about_fit.squared / about_fit.rank / used;
     result.nees_per_dof_about_mean += about_mean.squared / about_mean.rank / used;
@@ -255,13 +267,6 @@ summarize(const std::vector<Trial>& trials, CalibrationResult& result)
   result.sigma_ratio = toStd(predicted.cwiseSqrt().cwiseQuotient(sigma));
   result.bias_sigma = toStd(mean.cwiseQuotient(sigma));
   result.bias_after_shift_sigma = result.bias_sigma;
-}
-
-// [d | k | r | c] shift to the tangent space.
-ParameterVector
-tangentShift(const Patch& patch, const ParameterVector& shift)
-{
-  return tangentJacobian(patch) * shift;
 }
 
 } // namespace

@@ -47,26 +47,48 @@ kinectNoise()
   return StereoNoiseModel(StereoNoiseModel::Parameters{});
 }
 
+/// The points of a calibration scene that hit its patch, without noise, and what noise
+/// they would have.
+struct CleanSample {
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Eigen::Matrix3d> covariances, roots;
+  Eigen::Vector3d viewpoint = Eigen::Vector3d::Zero();
+};
+
+inline CleanSample
+cleanSample(const CalibrationScene& scene, double noise_scale = 1.0)
+{
+  RangeImage image = castRays(scene.scene, scene.rays);
+  attachNoise(image, kinectNoise());
+  CleanSample sample;
+  sample.viewpoint = image.sensor_pose.c;
+  for (std::size_t i = 0; i < image.truth.size(); ++i)
+    if (image.hits[i] >= 0) {
+      sample.points.push_back(image.truth[i]);
+      sample.roots.push_back(noise_scale * image.roots[i]);
+      sample.covariances.push_back(image.covariances[i]);
+    }
+  return sample;
+}
+
+/// Noise drawn once.
+inline Sample
+noisy(const CleanSample& clean, std::mt19937_64& generator)
+{
+  Sample sample;
+  sample.viewpoint = clean.viewpoint;
+  sample.covariances = clean.covariances;
+  drawNoise(clean.points, clean.roots, generator, sample.points);
+  return sample;
+}
+
 /// The points of a calibration scene that hit its patch, noise drawn once.
 inline Sample
 sampleScene(const CalibrationScene& scene,
             double noise_scale,
             std::mt19937_64& generator)
 {
-  RangeImage image = castRays(scene.scene, scene.rays);
-  attachNoise(image, kinectNoise());
-  Sample sample;
-  sample.viewpoint = image.sensor_pose.c;
-  std::vector<Eigen::Matrix3d> roots;
-  std::vector<Eigen::Vector3d> truth;
-  for (std::size_t i = 0; i < image.truth.size(); ++i)
-    if (image.hits[i] >= 0) {
-      truth.push_back(image.truth[i]);
-      roots.push_back(noise_scale * image.roots[i]);
-      sample.covariances.push_back(image.covariances[i]);
-    }
-  drawNoise(truth, roots, generator, sample.points);
-  return sample;
+  return noisy(cleanSample(scene, noise_scale), generator);
 }
 
 /// A robot scene from a distance of 0.8-1.2 m, any azimuth and a tilt of 0.2-0.8 rad.

@@ -29,6 +29,9 @@ struct CalibrationResult {
   int trials = 0;
   int points = 0;
   /// Normalised estimation error squared over the rank of the covariance: 1 is right.
+  /// About the noise-free fit; SecondOrder's region lies about the estimate plus its
+  /// mean shift (the estimate minus the shift is unbiased, but seen from the estimate
+  /// what it came from lies the other way, as on a bent line).
   double nees_per_dof = 0.0;
   double nees_per_dof_about_mean = 0.0;
   /// Share of the trials within the 95 % ellipsoid about the noise-free fit.
