@@ -131,11 +131,11 @@ neighborhoods(benchmark::State& state, int points)
 }
 
 void
-fitCovariance(benchmark::State& state, int points)
+fitCovariance(benchmark::State& state, int points, CovarianceMode mode)
 {
   const SamplerOptions options = samplerOptions(Neighborhood::Disc, points);
   std::vector<PointBatch> batches = gatherBatches(scene(), options);
-  const PatchEstimator estimator{FitOptions{}};
+  const PatchEstimator estimator(FitOptions{}, mode);
   double iterations = 0.0;
   double curved = 0.0;
   for (PointBatch& batch : batches) {
@@ -204,7 +204,10 @@ registerCases()
   for (const int n : {100, 400}) {
     const std::string size = "/" + std::to_string(n);
     add("whole_chain" + size, [n](benchmark::State& s) { wholeChain(s, n, 1); });
-    add("fit_covariance" + size, [n](benchmark::State& s) { fitCovariance(s, n); });
+    for (const CovarianceMode mode : kAllCovarianceModes)
+      if (mode != CovarianceMode::MonteCarlo)
+        add("fit_" + std::string(covarianceModeName(mode)) + size,
+            [n, mode](benchmark::State& s) { fitCovariance(s, n, mode); });
     add("neighborhood" + size, [n](benchmark::State& s) { neighborhoods(s, n); });
     add("pcl_normal_kdtree" + size, [n](benchmark::State& s) {
       pclNormal<pcl::search::KdTree<pcl::PointXYZ>>(s, n);
