@@ -1,0 +1,231 @@
+// Verdicts on fitted patches.
+#include "support/patch_batch.h"
+#include "support/random_patch.h"
+
+#include <holdfast/patch/boundary.h>
+#include <holdfast/uncertainty/covariance.h>
+#include <holdfast/validation/checks.h>
+
+#include <limits>
+#include <set>
+
+namespace holdfast { namespace {
+
+using test::Random;
+using test::Sample;
+
+constexpr std::uint64_t kCases = 20;
+
+// Limits that sound fits of the robot scenes keep with a wide margin: curvatures are at
+// most 10 1/m, the noise 2 to 5 mm.
+ValidationOptions
+fairLimits()
+{
+  ValidationOptions options;
+  options.max_curvature_per_m = 20.0;
+  options.max_residual_m = 0.01;
+  options.min_coverage = 0.4;
+  options.max_chi2_per_dof = 1.5;
+  return options;
+}
+
+struct Fit {
+  FitResult result;
+  PointBatch batch;
+};
+
+Fit
+fitTo(const Sample& sample, PatchType type)
+{
+  Fit fit;
+  fit.batch = test::batchOf(sample);
+  FitOptions options = test::optionsFor(type);
+  options.viewpoint = sample.viewpoint;
+  fit.result = estimatePatch(fit.batch, options);
+  return fit;
+}
+
+class Checks : public testing::TestWithParam<PatchType> {};
+
+TEST_P(Checks, AcceptASoundFitAndReportWhatTheyMeasured)
+{
+  for (std::uint64_t i = 0; i < kCases; ++i) {
+    Random random(i);
+    const Sample sample = test::robotSample(GetParam(), 1.0, random);
+    const Fit fit = fitTo(sample, GetParam());
+    const Validation validation = validate(fit.result, fit.batch, fairLimits());
+    EXPECT_EQ(verdictName(validation.verdict), "accepted");
+    const SurfaceResidual residual = measureResidual(fit.result.patch, fit.batch);
+    const Coverage coverage = measureCoverage(fit.result.patch, fit.batch);
+    EXPECT_EQ(validation.residual.rms_m, residual.rms_m);
+    EXPECT_EQ(validation.coverage.share, coverage.share);
+    EXPECT_EQ(validation.chi2_per_dof, fit.result.chi2 / fit.result.chi2_dof);
+    EXPECT_EQ(validation.curvature_per_m,
+              fit.result.patch.kappa.lpNorm<Eigen::Infinity>());
+    EXPECT_EQ(validate(fit.result, sample.points, fairLimits()).verdict,
+              PatchVerdict::Accepted);
+  }
+}
+
+TEST_P(Checks, RejectByEveryLimitJustBelowTheMeasuredValue)
+{
+  Random random;
+  const Fit fit = fitTo(test::robotSample(GetParam(), 1.0, random), GetParam());
+  ASSERT_TRUE(isUsable(fit.result.status));
+  const Validation measured = validate(fit.result, fit.batch, {});
+  EXPECT_EQ(measured.verdict, PatchVerdict::Accepted) << "without limits";
+  const auto verdict = [&](std::optional<double> ValidationOptions::*limit,
+                           double value) {
+    ValidationOptions options;
+    options.*limit = value;
+    return validate(fit.result, fit.batch, options).verdict;
+  };
+  const auto expectLimit = [&](std::optional<double> ValidationOptions::*limit,
+                               double value,
+                               PatchVerdict rejected) {
+    EXPECT_EQ(verdict(limit, value), PatchVerdict::Accepted);
+    EXPECT_EQ(verdict(limit, 0.999 * value), rejected);
+  };
+  expectLimit(&ValidationOptions::max_residual_m,
+              measured.residual.rms_m,
+              PatchVerdict::ResidualTooLarge);
+  expectLimit(&ValidationOptions::max_chi2_per_dof,
+              measured.chi2_per_dof,
+              PatchVerdict::ChiSquareTooLarge);
+  if (measured.curvature_per_m > 0.0)
+    expectLimit(&ValidationOptions::max_curvature_per_m,
+                measured.curvature_per_m,
+                PatchVerdict::CurvatureTooLarge);
+  EXPECT_EQ(verdict(&ValidationOptions::min_coverage, measured.coverage.share),
+            PatchVerdict::Accepted);
+}
+
+TEST_P(Checks, RejectAPatchWhosePointsLeaveMostOfItEmpty)
+{
+  for (std::uint64_t i = 0; i < kCases; ++i) {
+    Random random(i);
+    const Sample sample = test::robotSample(GetParam(), 1.0, random);
+    const Fit fit = fitTo(sample, GetParam());
+    // Cells that do not grow as the points get fewer.
+    ValidationOptions options;
+    options.coverage.cell_size_m = 0.03;
+    options.coverage.points_per_cell =
+        fit.batch.size() * 0.03 * 0.03 / projectedArea(fit.result.patch);
+    options.min_coverage =
+        0.8 * validate(fit.result, fit.batch, options).coverage.share;
+    const Pose pose = fit.result.patch.pose();
+    std::vector<Eigen::Vector3d> few;
+    for (const Eigen::Vector3d& point : sample.points)
+      if (pose.toLocal(point).x() > 0.25 * fit.result.patch.d(0))
+        few.push_back(point);
+    EXPECT_EQ(validate(fit.result, few, options).verdict, PatchVerdict::CoverageTooLow);
+  }
+}
+
+TEST_P(Checks, RejectASurfaceThatTheNoiseDoesNotExplain)
+{
+  Random random;
+  Sample sample = test::robotSample(GetParam(), 0.1, random);
+  test::addBumps(sample, 0.02, 20.0);
+  const Fit fit = fitTo(sample, GetParam());
+  ASSERT_TRUE(isUsable(fit.result.status)) << statusName(fit.result.status);
+  ValidationOptions options;
+  options.max_chi2_per_dof = 1.5;
+  EXPECT_EQ(validate(fit.result, fit.batch, options).verdict,
+            PatchVerdict::ChiSquareTooLarge);
+}
+
+INSTANTIATE_TEST_SUITE_P(AllTypes,
+                         Checks,
+                         testing::ValuesIn(kPatchTypes),
+                         test::patchTypeName);
+
+TEST(Verdicts, OfAFitThatIsNotUsableMeasureNothing)
+{
+  PointBatch batch;
+  const FitResult failed = estimatePatch(batch, {});
+  const Validation validation = validate(failed, batch, fairLimits());
+  EXPECT_EQ(validation.verdict, PatchVerdict::NotUsable);
+  EXPECT_EQ(validation.residual.points, 0);
+  EXPECT_EQ(validation.coverage.cells, 0);
+}
+
+TEST(Verdicts, WithoutAFinitePointAreNotUsable)
+{
+  Random random;
+  const PatchType type = kPatchTypes.front();
+  const Fit fit = fitTo(test::robotSample(type, 1.0, random), type);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<Eigen::Vector3d> none, invalid(3, {0.0, nan, 0.0});
+  EXPECT_EQ(validate(fit.result, none, {}).verdict, PatchVerdict::NotUsable);
+  EXPECT_EQ(validate(fit.result, invalid, {}).verdict, PatchVerdict::NotUsable);
+  EXPECT_EQ(validate(fit.result, PointBatch(), {}).verdict, PatchVerdict::NotUsable);
+}
+
+TEST(Verdicts, NameTheFirstLimitThatIsBroken)
+{
+  Random random;
+  const PatchType type = kPatchTypes.front();
+  const Fit fit = fitTo(test::robotSample(type, 1.0, random), type);
+  ValidationOptions options;
+  const auto verdict = [&] { return validate(fit.result, fit.batch, options).verdict; };
+  options.max_chi2_per_dof = 1e-3;
+  EXPECT_EQ(verdict(), PatchVerdict::ChiSquareTooLarge);
+  options.coverage.cell_size_m = 0.02;
+  options.coverage.points_per_cell = 1e6;
+  options.min_coverage = 0.5;
+  EXPECT_EQ(verdict(), PatchVerdict::CoverageTooLow);
+  options.max_residual_m = 1e-6;
+  EXPECT_EQ(verdict(), PatchVerdict::ResidualTooLarge);
+  options.max_curvature_per_m = 1e-3;
+  EXPECT_EQ(verdict(), PatchVerdict::CurvatureTooLarge);
+}
+
+TEST(Verdicts, OnPointsBeyondAllReasonAreNotAccepted)
+{
+  Random random;
+  const PatchType type = kPatchTypes.front();
+  const Fit fit = fitTo(test::robotSample(type, 1.0, random), type);
+  const std::vector<Eigen::Vector3d> far(10, Eigen::Vector3d::Constant(1e200));
+  ValidationOptions options;
+  options.max_residual_m = 0.01;
+  EXPECT_EQ(validate(fit.result, far, options).verdict, PatchVerdict::ResidualTooLarge);
+  EXPECT_EQ(validate(fit.result, far, {}).coverage.share, 0.0);
+}
+
+TEST(Verdicts, HaveNamesOfTheirOwn)
+{
+  std::set<std::string_view> names;
+  for (int i = 0; i <= static_cast<int>(PatchVerdict::ChiSquareTooLarge); ++i)
+    names.insert(verdictName(static_cast<PatchVerdict>(i)));
+  EXPECT_EQ(names.size(), 6u);
+  EXPECT_EQ(verdictName(PatchVerdict::Accepted), "accepted");
+  EXPECT_EQ(verdictName(PatchVerdict::ChiSquareTooLarge), "chi_square_too_large");
+}
+
+TEST(ValidationOptionsCheck, NamesWhatIsWrong)
+{
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(validityError(ValidationOptions{}), "");
+  EXPECT_EQ(validityError(fairLimits()), "");
+  const auto expectError = [](std::optional<double> ValidationOptions::*limit,
+                              double value,
+                              const char* name) {
+    ValidationOptions options;
+    options.*limit = value;
+    EXPECT_NE(validityError(options).find(name), std::string::npos) << value;
+    EXPECT_THROW(validate(FitResult(), PointBatch(), options), std::invalid_argument);
+  };
+  for (const double bad : {0.0, -1.0, nan}) {
+    expectError(&ValidationOptions::max_curvature_per_m, bad, "max_curvature_per_m");
+    expectError(&ValidationOptions::max_residual_m, bad, "max_residual_m");
+    expectError(&ValidationOptions::max_chi2_per_dof, bad, "max_chi2_per_dof");
+  }
+  for (const double bad : {-0.1, 1.1, nan})
+    expectError(&ValidationOptions::min_coverage, bad, "min_coverage");
+  ValidationOptions options;
+  options.coverage.max_spill = -1.0;
+  EXPECT_NE(validityError(options).find("max_spill"), std::string::npos);
+}
+
+}} // namespace holdfast
