@@ -7,6 +7,7 @@
 #include <holdfast/fit/surface_fit.h>
 
 #include <functional>
+#include <limits>
 #include <tuple>
 
 namespace holdfast { namespace kernel { namespace {
@@ -284,9 +285,7 @@ TEST_P(Kernel, LIsTheDerivativeOfTheCostAlongAPolynomial)
   for (std::uint64_t i = 0; i < kCases; ++i) {
     Random random(i);
     const Problem p = problem(random);
-    NormalSums normal;
     CovarianceSums covariance;
-    accumulateNormal(p.model, p.residual, p.kernelView(), p.state(), normal);
     accumulateCovariance(p.model, p.residual, p.kernelView(), p.state(), covariance);
     constexpr int kRow[] = {0, 1, 2, 0, 0, 1}, kColumn[] = {0, 1, 2, 1, 2, 2};
     // L[z] of a plane is zero; its terms of 0.01 m or more cancel.
@@ -317,8 +316,35 @@ TEST_P(Kernel, LIsTheDerivativeOfTheCostAlongAPolynomial)
       }
       if (m == P1)
         magnitude_of_one = magnitude;
-      expectClose(normal.L[m], sum, magnitude, "normal " + std::to_string(m));
-      expectClose(covariance.L[m], sum, magnitude, "covariance " + std::to_string(m));
+      expectClose(covariance.L[m], sum, magnitude, "L " + std::to_string(m));
+    }
+  }
+}
+
+TEST_P(Kernel, GradientIsTheDerivativeOfTheCost)
+{
+  for (std::uint64_t i = 0; i < kCases; ++i) {
+    Random random(i);
+    const Problem p = problem(random);
+    NormalSums normal;
+    CovarianceSums covariance;
+    accumulateNormal(p.model, p.residual, p.kernelView(), p.state(), normal);
+    accumulateCovariance(p.model, p.residual, p.kernelView(), p.state(), covariance);
+    for (int a = 0; a < parameterCount(p.model); ++a) {
+      Real sum = 0, magnitude = 0;
+      for (const Point& point : p.points) {
+        const Real term = derivative(
+            [&](Real x) {
+              const Real e =
+                  residualAt(p.quadric() + p.slope(a) * x, point, p.residual);
+              return e * e / 2;
+            },
+            kSmallStep);
+        sum += term;
+        magnitude += std::abs(term);
+      }
+      expectClose(normal.gradient[a], sum, magnitude, "normal");
+      expectClose(covariance.gradient[a], sum, magnitude, "covariance");
     }
   }
 }
@@ -518,12 +544,13 @@ TEST(KernelRay, ResidualIsTheDistanceAlongTheRay)
 std::vector<std::size_t>
 groupSizes(const NormalSums&)
 {
-  return {1, kPolynomials, 21};
+  return {1, kMaxTheta, 21};
 }
 std::vector<std::size_t>
 groupSizes(const CovarianceSums&)
 {
   return {1,
+          kMaxTheta,
           kPolynomials,
           15,
           3 * kMaxTheta,
@@ -660,6 +687,32 @@ TEST(KernelMoments, SimdSumsAreThoseOfThePointsWithoutPadding)
           reference::accumulateQuadric(points, state.R, state.c, sums);
         });
   }
+}
+
+// Every channel of every point spoilt in turn, the padding of the last block included.
+TEST(KernelValidity, CountStopsInTheLanesOfTheFirstInvalidPoint)
+{
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  constexpr int kCount = 21;
+  Random random;
+  Problem p =
+      randomProblem(Model::Paraboloid, Residual::Sampson, kCount, kNoiseSpread, random);
+  const Points points = p.kernelView();
+  EXPECT_EQ(countLeadingValid(points), points.padded_size);
+  EXPECT_EQ(reference::countLeadingValid(points), points.padded_size);
+  for (int channel = PointBatch::X; channel < PointBatch::W; ++channel)
+    for (int i = 0; i < kCount; ++i) {
+      double& value = p.batch.channel(static_cast<PointBatch::Channel>(channel))[i];
+      const double sound = value;
+      for (const double bad : {kNaN, kInfinity, -kInfinity}) {
+        value = bad;
+        EXPECT_EQ(reference::countLeadingValid(points), i);
+        EXPECT_LE(countLeadingValid(points), i);
+        EXPECT_GT(countLeadingValid(points), i - PointBatch::kLaneMultiple);
+      }
+      value = sound;
+    }
 }
 
 TEST(KernelMoments, AreThoseOfTheDefinition)

@@ -9,6 +9,7 @@
 //   sumOfLanes(Number)        their sum
 //   squareRoot(Number)
 //   selectLess(a, b, x, y)    a < b ? x : y, lane by lane
+//   allLess(a, b)             a < b in every lane
 //   HOLDFAST_INLINE           before functions of the hot loop
 //   HOLDFAST_UNROLL           before loops of constant length, whose arrays then live
 //   in
@@ -31,12 +32,16 @@ multiply(const Number S[6], const Number v[3], Number out[3])
   out[2] = S[2] * v[0] + S[4] * v[1] + S[5] * v[2];
 }
 
+// Coordinates and covariance, as they are in the batch.
 HOLDFAST_INLINE void
-cross(const Number a[3], const Number b[3], Number out[3])
+loadPoint(const Points& points, int i, Number q[3], Number S[6])
 {
-  out[0] = a[1] * b[2] - a[2] * b[1];
-  out[1] = a[2] * b[0] - a[0] * b[2];
-  out[2] = a[0] * b[1] - a[1] * b[0];
+  HOLDFAST_UNROLL
+  for (int k = 0; k < 3; ++k)
+    q[k] = load(points.channel[k] + i);
+  HOLDFAST_UNROLL
+  for (int k = 0; k < 6; ++k)
+    S[k] = load(points.channel[3 + k] + i);
 }
 
 // R^T v.
@@ -67,45 +72,87 @@ rotateCovarianceIntoFrame(const double R[9], const Number S[6], Number out[6])
              SR[column[e]][2] * R[6 + row[e]];
 }
 
-// e x u - G (e x v): with u = G v it is G_a v, with v = q and u = g it is B_a.
-template <int axis, typename Surface>
+// R v.
 HOLDFAST_INLINE void
-rotationDerivativeG(const Surface& surface,
-                    const Number v[3],
-                    const Number u[3],
-                    Number out[3])
+rotateOutOfFrame(const double R[9], const Number v[3], Number out[3])
 {
-  constexpr int i = (axis + 1) % 3, j = (axis + 2) % 3;
-  Number turned[3], G_turned[3];
-  turned[axis] = Number(0.0);
-  turned[i] = 0.0 - v[j];
-  turned[j] = v[i];
-  surface.applyG(turned, G_turned);
-  out[axis] = 0.0 - G_turned[axis];
-  out[i] = 0.0 - u[j] - G_turned[i];
-  out[j] = u[i] - G_turned[j];
+  HOLDFAST_UNROLL
+  for (int i = 0; i < 3; ++i)
+    out[i] = v[0] * R[3 * i] + v[1] * R[3 * i + 1] + v[2] * R[3 * i + 2];
 }
 
-// Component `axis` of a rotation R <- R Exp(delta) as a parameter of the surface:
-// f_a = (g x q)_axis and B_a = e x g - G (e x q).
-template <int axis, typename Surface>
+// ---- Polynomials in q: 1 x y z xx yy zz xy xz yz ------------------------------------
+
+// v^T (hess p) v / 2 of each: the quadratic ones at v.
 HOLDFAST_INLINE void
-rotationDerivative(const Surface& surface,
-                   const Number q[3],
-                   const Number g[3],
-                   Number& f,
-                   Number B[3])
+quadraticMonomials(const Number v[3], Number p[kPolynomials])
 {
-  constexpr int i = (axis + 1) % 3, j = (axis + 2) % 3;
-  f = g[i] * q[j] - g[j] * q[i];
-  rotationDerivativeG<axis>(surface, q, g, B);
+  p[P1] = p[PX] = p[PY] = p[PZ] = Number(0.0);
+  p[PXX] = v[0] * v[0], p[PYY] = v[1] * v[1], p[PZZ] = v[2] * v[2];
+  p[PXY] = v[0] * v[1], p[PXZ] = v[0] * v[2], p[PYZ] = v[1] * v[2];
 }
 
-// ---- Surfaces: G v, and per shape parameter f_a, B_a and G_a v --------------------
+HOLDFAST_INLINE void
+monomials(const Number q[3], Number p[kPolynomials])
+{
+  quadraticMonomials(q, p);
+  p[P1] = Number(1.0), p[PX] = q[0], p[PY] = q[1], p[PZ] = q[2];
+}
+
+// Row `axis` of (hess p) v of each.
+HOLDFAST_INLINE void
+hessianRow(int axis, const Number v[3], Number p[kPolynomials])
+{
+  const Number zero(0.0);
+  p[P1] = p[PX] = p[PY] = p[PZ] = zero;
+  p[PXX] = axis == 0 ? v[0] * 2.0 : zero;
+  p[PYY] = axis == 1 ? v[1] * 2.0 : zero;
+  p[PZZ] = axis == 2 ? v[2] * 2.0 : zero;
+  p[PXY] = axis == 0 ? v[1] : axis == 1 ? v[0] : zero;
+  p[PXZ] = axis == 0 ? v[2] : axis == 2 ? v[0] : zero;
+  p[PYZ] = axis == 1 ? v[2] : axis == 2 ? v[1] : zero;
+}
+
+// Component `axis` of grad p at q of each.
+HOLDFAST_INLINE void
+gradientComponent(int axis, const Number q[3], Number p[kPolynomials])
+{
+  hessianRow(axis, q, p);
+  p[PX + axis] = Number(1.0);
+}
+
+// f p + mu.grad p + w t^T (hess p) t / 2 of each: how a function of f, g and G with
+// these derivatives changes as f grows by p.
+HOLDFAST_INLINE void
+changeAlong(const Number q[3],
+            const Number t[3],
+            Number f,
+            const Number mu[3],
+            Number w,
+            Number p[kPolynomials])
+{
+  const Number x = q[0], y = q[1], z = q[2];
+  const Number fx = f * x, fy = f * y, fz = f * z;
+  const Number wx = w * t[0], wy = w * t[1], wz = w * t[2];
+  p[P1] = f;
+  p[PX] = fx + mu[0];
+  p[PY] = fy + mu[1];
+  p[PZ] = fz + mu[2];
+  p[PXX] = x * (p[PX] + mu[0]) + wx * t[0];
+  p[PYY] = y * (p[PY] + mu[1]) + wy * t[1];
+  p[PZZ] = z * (p[PZ] + mu[2]) + wz * t[2];
+  p[PXY] = x * p[PY] + y * mu[0] + wx * t[1];
+  p[PXZ] = x * p[PZ] + z * mu[0] + wx * t[2];
+  p[PYZ] = y * p[PZ] + z * mu[1] + wy * t[2];
+}
+
+// ---- Surfaces: G v, and f_a of every parameter as a combination of polynomials ------
+//
+// Whatever is linear in f (B_a, G_a, L[f_a], the derivative of a residual) is combined
+// in the same way from its values for the polynomials.
 
 struct ParaboloidSurface {
-  static constexpr int kShape = shapeParameterCount(Model::Paraboloid);
-  static constexpr int kTranslations = 1;
+  static constexpr Model kModel = Model::Paraboloid;
   const State& s;
 
   HOLDFAST_INLINE void applyG(const Number v[3], Number out[3]) const
@@ -115,50 +162,23 @@ struct ParaboloidSurface {
     out[2] = Number(0.0);
   }
 
-  // dG/dkxx, dG/dkxy, dG/dkyy times v.
-  static HOLDFAST_INLINE void applyCurvatureDerivative(const Number v[3],
-                                                       Number out[3][3])
+  // delta: (g x q)_x, (g x q)_y; a: -g.line.
+  template <typename T>
+  HOLDFAST_INLINE void combine(const T p[kPolynomials], T f[]) const
   {
-    const Number x = v[0] * 2.0, y = v[1] * 2.0, zero(0.0);
-    out[0][0] = x, out[0][1] = zero, out[0][2] = zero;
-    out[1][0] = y, out[1][1] = x, out[1][2] = zero;
-    out[2][0] = zero, out[2][1] = y, out[2][2] = zero;
-  }
-
-  HOLDFAST_INLINE void shape(const Number q[3],
-                             const Number g[3],
-                             Number f[kShape],
-                             Number B[kShape][3]) const
-  {
-    f[0] = q[0] * q[0];
-    f[1] = q[0] * q[1] * 2.0;
-    f[2] = q[1] * q[1];
-    applyCurvatureDerivative(q, B);
-    rotationDerivative<0>(*this, q, g, f[3], B[3]);
-    rotationDerivative<1>(*this, q, g, f[4], B[4]);
-  }
-
-  // G_a v for every shape parameter; Gv = G v.
-  HOLDFAST_INLINE void applyShapeG(const Number v[3],
-                                   const Number Gv[3],
-                                   Number out[kShape][3]) const
-  {
-    applyCurvatureDerivative(v, out);
-    rotationDerivativeG<0>(*this, v, Gv, out[3]);
-    rotationDerivativeG<1>(*this, v, Gv, out[4]);
-  }
-
-  HOLDFAST_INLINE void direction(int, double d[3]) const
-  {
-    HOLDFAST_UNROLL
-    for (int i = 0; i < 3; ++i)
-      d[i] = s.line[i];
+    const double xx = 2.0 * s.k[0], xy = 2.0 * s.k[1], yy = 2.0 * s.k[2];
+    f[0] = p[PXX];
+    f[1] = p[PXY] * 2.0;
+    f[2] = p[PYY];
+    f[3] = p[PXZ] * xy + p[PYZ] * yy + p[PY] * 2.0;
+    f[4] = p[PXZ] * -xx + p[PYZ] * -xy + p[PX] * -2.0;
+    f[5] = p[PX] * -(xx * s.line[0] + xy * s.line[1]) +
+           p[PY] * -(xy * s.line[0] + yy * s.line[1]) + p[P1] * (2.0 * s.line[2]);
   }
 };
 
 struct SphereSurface {
-  static constexpr int kShape = shapeParameterCount(Model::Sphere);
-  static constexpr int kTranslations = 3;
+  static constexpr Model kModel = Model::Sphere;
   const State& s;
 
   HOLDFAST_INLINE void applyG(const Number v[3], Number out[3]) const
@@ -168,36 +188,20 @@ struct SphereSurface {
       out[i] = v[i] * (2.0 * s.k[0]);
   }
 
-  HOLDFAST_INLINE void shape(const Number q[3],
-                             const Number*,
-                             Number f[kShape],
-                             Number B[kShape][3]) const
+  // c: -g.
+  template <typename T>
+  HOLDFAST_INLINE void combine(const T p[kPolynomials], T f[]) const
   {
-    f[0] = dot(q, q);
-    HOLDFAST_UNROLL
-    for (int i = 0; i < 3; ++i)
-      B[0][i] = q[i] * 2.0;
-  }
-
-  HOLDFAST_INLINE void applyShapeG(const Number v[3],
-                                   const Number*,
-                                   Number out[kShape][3]) const
-  {
-    HOLDFAST_UNROLL
-    for (int i = 0; i < 3; ++i)
-      out[0][i] = v[i] * 2.0;
-  }
-
-  HOLDFAST_INLINE void direction(int i, double d[3]) const
-  {
-    d[0] = d[1] = d[2] = 0.0;
-    d[i] = 1.0;
+    const double k = 2.0 * s.k[0];
+    f[0] = p[PXX] + p[PYY] + p[PZZ];
+    f[1] = p[PX] * -k;
+    f[2] = p[PY] * -k;
+    f[3] = p[PZ] * -k + p[P1] * 2.0;
   }
 };
 
 struct CylinderSurface {
-  static constexpr int kShape = shapeParameterCount(Model::Cylinder);
-  static constexpr int kTranslations = 2;
+  static constexpr Model kModel = Model::Cylinder;
   const State& s;
 
   HOLDFAST_INLINE void applyG(const Number v[3], Number out[3]) const
@@ -207,36 +211,21 @@ struct CylinderSurface {
     out[2] = v[2] * (2.0 * s.k[0]);
   }
 
-  HOLDFAST_INLINE void shape(const Number q[3],
-                             const Number g[3],
-                             Number f[kShape],
-                             Number B[kShape][3]) const
+  // delta: (g x q)_y, (g x q)_z; c: -g_y, -g_z.
+  template <typename T>
+  HOLDFAST_INLINE void combine(const T p[kPolynomials], T f[]) const
   {
-    f[0] = q[1] * q[1] + q[2] * q[2];
-    B[0][0] = Number(0.0), B[0][1] = q[1] * 2.0, B[0][2] = q[2] * 2.0;
-    rotationDerivative<1>(*this, q, g, f[1], B[1]);
-    rotationDerivative<2>(*this, q, g, f[2], B[2]);
-  }
-
-  HOLDFAST_INLINE void applyShapeG(const Number v[3],
-                                   const Number Gv[3],
-                                   Number out[kShape][3]) const
-  {
-    out[0][0] = Number(0.0), out[0][1] = v[1] * 2.0, out[0][2] = v[2] * 2.0;
-    rotationDerivativeG<1>(*this, v, Gv, out[1]);
-    rotationDerivativeG<2>(*this, v, Gv, out[2]);
-  }
-
-  HOLDFAST_INLINE void direction(int i, double d[3]) const
-  {
-    d[0] = d[1] = d[2] = 0.0;
-    d[i + 1] = 1.0;
+    const double k = 2.0 * s.k[0];
+    f[0] = p[PYY] + p[PZZ];
+    f[1] = p[PXZ] * k + p[PX] * -2.0;
+    f[2] = p[PXY] * -k;
+    f[3] = p[PY] * -k;
+    f[4] = p[PZ] * -k + p[P1] * 2.0;
   }
 };
 
 struct PlaneSurface {
-  static constexpr int kShape = shapeParameterCount(Model::Plane);
-  static constexpr int kTranslations = 1;
+  static constexpr Model kModel = Model::Plane;
   const State& s;
 
   HOLDFAST_INLINE void applyG(const Number*, Number out[3]) const
@@ -244,484 +233,281 @@ struct PlaneSurface {
     out[0] = out[1] = out[2] = Number(0.0);
   }
 
-  HOLDFAST_INLINE void shape(const Number q[3],
-                             const Number g[3],
-                             Number f[kShape],
-                             Number B[kShape][3]) const
+  // delta: (g x q)_x, (g x q)_y; c_z: -g_z.
+  template <typename T>
+  HOLDFAST_INLINE void combine(const T p[kPolynomials], T f[]) const
   {
-    rotationDerivative<0>(*this, q, g, f[0], B[0]);
-    rotationDerivative<1>(*this, q, g, f[1], B[1]);
-  }
-
-  HOLDFAST_INLINE void applyShapeG(const Number*,
-                                   const Number*,
-                                   Number out[kShape][3]) const
-  {
-    HOLDFAST_UNROLL
-    for (int a = 0; a < kShape; ++a)
-      out[a][0] = out[a][1] = out[a][2] = Number(0.0);
-  }
-
-  HOLDFAST_INLINE void direction(int, double d[3]) const
-  {
-    d[0] = d[1] = 0.0;
-    d[2] = 1.0;
+    f[0] = p[PY] * 2.0;
+    f[1] = p[PX] * -2.0;
+    f[2] = p[P1] * 2.0;
   }
 };
 
-// ---- Residuals: E(f, V, w) and its partial derivatives ----------------------------
+// ---- Residuals: E(f, V, w) = e^2 / 2 ------------------------------------------------
 
-struct Partials {
-  Number E, f, V, w; // E and its gradient
-  Number ff, fV, VV, fw, Vw, ww; // its Hessian
+// sqrt(V) times the residual e and its gradient.
+struct ScaledResidual {
+  Number e, f, V, w;
 };
 
-// Gradient of e, where E = e^2 / 2.
-struct ResidualGradient {
-  Number f, V, w;
+struct SecondPartials {
+  Number ff, fV, VV, fw, Vw, ww; // of E
 };
 
-// E = f^2 / (2 V).
+// e = f / sqrt(V). The weight, 0 or 1, is that of padding and points.
 struct SampsonResidual {
   static constexpr bool kUsesCurvature = false;
+  Number inverse, h, residual;
 
-  static HOLDFAST_INLINE void evaluate(Number f,
-                                       Number V,
-                                       Number,
-                                       Partials& p,
-                                       ResidualGradient& e)
+  HOLDFAST_INLINE SampsonResidual(Number f, Number V, Number, Number weight)
+  : inverse(weight / V), h(f * inverse), residual(f)
+  {}
+
+  HOLDFAST_INLINE ScaledResidual first() const
   {
-    const Number inverse = 1.0 / V;
-    const Number h = f * inverse;
-    const Number root = squareRoot(inverse);
-    p.E = f * h * 0.5;
-    p.f = h;
-    p.V = h * h * -0.5;
-    p.w = Number(0.0);
-    e.f = root;
-    e.V = h * root * -0.5;
-    e.w = Number(0.0);
+    return {residual, Number(1.0), h * -0.5, Number(0.0)};
   }
 
-  static HOLDFAST_INLINE void second(Number f, Number V, Number, Partials& p)
+  HOLDFAST_INLINE SecondPartials second() const
   {
-    const Number inverse = 1.0 / V;
-    const Number h = f * inverse;
-    p.ff = inverse;
-    p.fV = 0.0 - h * inverse;
-    p.VV = h * h * inverse;
-    p.fw = p.Vw = p.ww = Number(0.0);
+    const Number zero(0.0);
+    return {inverse, h * inverse * -1.0, h * h * inverse, zero, zero, zero};
   }
 };
 
-// E = phi(tau)^2 f^2 / (2 V), tau = 4 f w / V^2, phi = 2 / (1 + s), s = sqrt(1 - tau):
-// half the squared Mahalanobis distance to the foot on the ray q - t Sigma g. Where the
-// ray all but misses the surface, 1 - tau < 1/4, s continues as (1/4)/(3/4 - (1 -
-// tau)), which meets the root in value and slope and stays positive.
+// e = phi(tau) f / sqrt(V), tau = 4 f w / V^2, phi = 2 / (1 + s), s = sqrt(1 - tau):
+// the Mahalanobis distance to the foot on the ray q - t Sigma g. Where the ray all but
+// misses the surface, 1 - tau < 1/4, s continues as (1/4)/(3/4 - (1 - tau)), which
+// meets the root in value and slope and stays positive.
 struct RayResidual {
   static constexpr bool kUsesCurvature = true;
+  Number inverse, h, residual, tau;
+  Number phi, phi1, phi2; // phi and its first two derivatives
 
-  // s and its first two derivatives with respect to tau.
-  static HOLDFAST_INLINE void root(Number tau, Number& s, Number& s1, Number& s2)
+  HOLDFAST_INLINE RayResidual(Number f, Number V, Number w, Number weight)
+  : inverse(weight / V), h(f * inverse), tau(h * w * inverse * 4.0)
   {
-    const Number x = 1.0 - tau;
-    const Number quarter(0.25);
+    const Number x = 1.0 - tau, quarter(0.25);
     const Number hit = squareRoot(selectLess(x, quarter, quarter, x));
-    const Number inverse = 1.0 / selectLess(x, quarter, 0.75 - x, hit);
-    s = selectLess(x, quarter, inverse * 0.25, hit);
+    const Number over = 1.0 / selectLess(x, quarter, 0.75 - x, hit);
+    const Number s = selectLess(x, quarter, over * 0.25, hit);
     // Hit: s' = -1/(2s), s'' = -1/(4 s^3). Miss, y = 1/(3/4 - x): -y^2/4, y^3/2.
-    s1 = selectLess(x, quarter, inverse * inverse * -0.25, inverse * -0.5);
-    s2 = inverse * inverse * inverse *
-         selectLess(x, quarter, Number(0.5), Number(-0.25));
+    const Number s1 = selectLess(x, quarter, over * over * -0.25, over * -0.5);
+    const Number s2 =
+        over * over * over * selectLess(x, quarter, Number(0.5), Number(-0.25));
+    phi = 2.0 / (1.0 + s);
+    phi1 = phi * phi * s1 * -0.5;
+    phi2 = phi * phi * (phi * s1 * s1 - s2) * 0.5;
+    residual = phi * f;
   }
 
-  static HOLDFAST_INLINE void evaluate(Number f,
-                                       Number V,
-                                       Number w,
-                                       Partials& p,
-                                       ResidualGradient& e)
+  HOLDFAST_INLINE ScaledResidual first() const
   {
-    const Number inverse = 1.0 / V;
-    const Number h = f * inverse;
-    const Number tau = h * w * inverse * 4.0;
-    Number s, s1, s2;
-    root(tau, s, s1, s2);
-    const Number phi = 2.0 / (1.0 + s);
-    const Number phi1 = phi * phi * s1 * -0.5;
-    const Number Phi = phi * phi, Phi1 = phi * phi1 * 2.0;
-    p.E = f * h * Phi * 0.5;
-    p.f = h * (Phi + tau * Phi1 * 0.5);
-    p.V = h * h * (Phi + tau * Phi1 * 2.0) * -0.5;
-    p.w = h * h * h * Phi1 * 2.0;
-    const Number inverse_root = squareRoot(inverse);
-    e.f = inverse_root * (phi + tau * phi1);
-    e.V = inverse_root * h * (phi * -0.5 - tau * phi1 * 2.0);
-    e.w = inverse_root * h * h * phi1 * 4.0;
+    const Number slope = tau * phi1;
+    return {residual, phi + slope, h * (phi * -0.5 - slope * 2.0), h * h * phi1 * 4.0};
   }
 
-  static HOLDFAST_INLINE void second(Number f, Number V, Number w, Partials& p)
+  HOLDFAST_INLINE SecondPartials second() const
   {
-    const Number inverse = 1.0 / V;
-    const Number h = f * inverse;
-    const Number tau = h * w * inverse * 4.0;
-    Number s, s1, s2;
-    root(tau, s, s1, s2);
-    const Number phi = 2.0 / (1.0 + s);
-    const Number phi1 = phi * phi * s1 * -0.5;
-    const Number phi2 = phi * phi * (phi * s1 * s1 - s2) * 0.5;
     const Number Phi = phi * phi, Phi1 = phi * phi1 * 2.0;
-    const Number tau_Phi2 = tau * (phi1 * phi1 + phi * phi2) * 2.0;
+    const Number half_Phi2 = phi1 * phi1 + phi * phi2;
+    const Number tau_Phi2 = tau * half_Phi2 * 2.0;
     const Number h2 = h * h * inverse;
-    p.ff = inverse * (Phi + tau * (Phi1 * 2.0 + tau_Phi2 * 0.5));
-    p.fV = 0.0 - h * inverse * (Phi + tau * (Phi1 * 3.5 + tau_Phi2));
-    p.VV = h2 * (Phi + tau * (Phi1 * 5.0 + tau_Phi2 * 2.0));
-    p.fw = h2 * (Phi1 * 3.0 + tau_Phi2) * 2.0;
-    p.Vw = h2 * h * (Phi1 * 3.0 + tau_Phi2 * 2.0) * -2.0;
-    p.ww = h2 * h * h * (phi1 * phi1 + phi * phi2) * 16.0;
+    return {inverse * (Phi + tau * (Phi1 * 2.0 + tau_Phi2 * 0.5)),
+            h * inverse * (Phi + tau * (Phi1 * 3.5 + tau_Phi2)) * -1.0,
+            h2 * (Phi + tau * (Phi1 * 5.0 + tau_Phi2 * 2.0)),
+            h2 * (Phi1 * 3.0 + tau_Phi2) * 2.0,
+            h2 * h * (Phi1 * 3.0 + tau_Phi2 * 2.0) * -2.0,
+            h2 * h * h * half_Phi2 * 16.0};
   }
 };
 
 // ---- One point --------------------------------------------------------------------
 
+// Sigma of a point as it is in the batch: cheaper for a product or two.
+struct BatchNoise {
+  const double* R;
+  Number S[6];
+
+  HOLDFAST_INLINE void enter(const double frame[9], const Number batch[6])
+  {
+    R = frame;
+    HOLDFAST_UNROLL
+    for (int e = 0; e < 6; ++e)
+      S[e] = batch[e];
+  }
+
+  HOLDFAST_INLINE void apply(const Number v[3], Number out[3]) const
+  {
+    Number outside[3], noisy[3];
+    rotateOutOfFrame(R, v, outside);
+    multiply(S, outside, noisy);
+    rotateIntoFrame(R, noisy, out);
+  }
+};
+
+// Sigma of a point brought into the local frame.
+struct LocalNoise {
+  Number S[6];
+
+  HOLDFAST_INLINE void enter(const double frame[9], const Number batch[6])
+  {
+    rotateCovarianceIntoFrame(frame, batch, S);
+  }
+
+  HOLDFAST_INLINE void apply(const Number v[3], Number out[3]) const
+  {
+    multiply(S, v, out);
+  }
+};
+
 // A point seen from the local frame.
+template <typename Noise>
 struct Local {
-  Number q[3], S[6], weight;
+  Noise noise;
+  Number q[3], weight;
   Number g[3], t[3], Gt[3], r[3];
   Number f, V, w;
 };
 
-template <typename Surface, typename ResidualPolicy>
+template <typename ResidualPolicy, typename Surface, typename Noise>
 HOLDFAST_INLINE void
-enterFrame(const Surface& surface, const Points& points, int i, Local& p)
+enterFrame(const Surface& surface, const Points& points, int i, Local<Noise>& p)
 {
   const State& state = surface.s;
   Number offset[3], S[6];
+  loadPoint(points, i, offset, S);
   HOLDFAST_UNROLL
   for (int k = 0; k < 3; ++k)
-    offset[k] = load(points.channel[k] + i) - state.c[k];
-  HOLDFAST_UNROLL
-  for (int k = 0; k < 6; ++k)
-    S[k] = load(points.channel[3 + k] + i);
+    offset[k] = offset[k] - state.c[k];
   p.weight = load(points.channel[9] + i);
   rotateIntoFrame(state.R, offset, p.q);
-  rotateCovarianceIntoFrame(state.R, S, p.S);
+  p.noise.enter(state.R, S);
   surface.applyG(p.q, p.g);
   p.g[2] = p.g[2] - 2.0;
-  multiply(p.S, p.g, p.t);
+  p.noise.apply(p.g, p.t);
   // Padding has Sigma = 0 and weight 0: keep its V away from zero.
   p.V = dot(p.g, p.t) + (1.0 - p.weight);
   p.f = dot(p.q, p.g) * 0.5 - p.q[2];
   surface.applyG(p.t, p.Gt);
+  p.r[0] = p.r[1] = p.r[2] = p.w = Number(0.0);
   if (ResidualPolicy::kUsesCurvature) {
-    multiply(p.S, p.Gt, p.r);
+    p.noise.apply(p.Gt, p.r);
     p.w = dot(p.t, p.Gt) * 0.5;
   }
-  else {
-    p.r[0] = p.r[1] = p.r[2] = p.w = Number(0.0);
-  }
 }
 
+// 2 V' t + w' r: derivative with respect to g of what has derivatives V', w'.
+template <typename Noise>
 HOLDFAST_INLINE void
-applyWeight(Number weight, Partials& E)
+slopeInG(const Local<Noise>& p, Number V, Number w, Number mu[3])
 {
-  E.E = E.E * weight;
-  E.f = E.f * weight;
-  E.V = E.V * weight;
-  E.w = E.w * weight;
-}
-
-HOLDFAST_INLINE void
-applyWeightToSecond(Number weight, Partials& E)
-{
-  E.ff = E.ff * weight;
-  E.fV = E.fV * weight;
-  E.VV = E.VV * weight;
-  E.fw = E.fw * weight;
-  E.Vw = E.Vw * weight;
-  E.ww = E.ww * weight;
-}
-
-// Adds one point's share of L[p] for the ten polynomials.
-HOLDFAST_INLINE void
-addPolynomials(const Local& p, const Partials& E, Number L[kPolynomials])
-{
-  const Number x = p.q[0], y = p.q[1], z = p.q[2];
-  Number m[3];
   HOLDFAST_UNROLL
   for (int i = 0; i < 3; ++i)
-    m[i] = p.t[i] * E.V * 2.0 + p.r[i] * E.w;
-  const Number fx = E.f * x, fy = E.f * y, fz = E.f * z;
-  const Number wx = E.w * p.t[0], wy = E.w * p.t[1], wz = E.w * p.t[2];
-  L[P1] = L[P1] + E.f;
-  L[PX] = L[PX] + (fx + m[0]);
-  L[PY] = L[PY] + (fy + m[1]);
-  L[PZ] = L[PZ] + (fz + m[2]);
-  L[PXX] = L[PXX] + (x * (fx + m[0] * 2.0) + wx * p.t[0]);
-  L[PYY] = L[PYY] + (y * (fy + m[1] * 2.0) + wy * p.t[1]);
-  L[PZZ] = L[PZZ] + (z * (fz + m[2] * 2.0) + wz * p.t[2]);
-  L[PXY] = L[PXY] + (x * (fy + m[1]) + y * m[0] + wx * p.t[1]);
-  L[PXZ] = L[PXZ] + (x * (fz + m[2]) + z * m[0] + wx * p.t[2]);
-  L[PYZ] = L[PYZ] + (y * (fz + m[2]) + z * m[1] + wy * p.t[2]);
+    mu[i] = p.t[i] * (V * 2.0) + p.r[i] * w;
 }
 
-// f_a, B_a, and G_a t, G_a r of every parameter at one point.
+// f_a, B_a, G_a t and t^T G_a t / 2 of every parameter.
 template <typename Surface>
-struct ParameterDerivatives {
-  static constexpr int kShape = Surface::kShape;
-  static constexpr int kCount = kShape + Surface::kTranslations;
-  Number f[kCount], B[kCount][3];
-  Number Gt[kShape][3], Gr[kShape][3]; // zero for translations
+struct SurfaceDerivatives {
+  static constexpr int kCount = parameterCount(Surface::kModel);
+  Number f[kCount], B[kCount][3], Gt[kCount][3], tGt[kCount];
+
+  HOLDFAST_INLINE
+  SurfaceDerivatives(const Surface& surface, const Number q[3], const Number t[3])
+  {
+    Number p[kPolynomials], column[kCount];
+    monomials(q, p);
+    surface.combine(p, f);
+    quadraticMonomials(t, p);
+    surface.combine(p, tGt);
+    HOLDFAST_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      gradientComponent(k, q, p);
+      surface.combine(p, column);
+      HOLDFAST_UNROLL
+      for (int a = 0; a < kCount; ++a)
+        B[a][k] = column[a];
+      hessianRow(k, t, p);
+      surface.combine(p, column);
+      HOLDFAST_UNROLL
+      for (int a = 0; a < kCount; ++a)
+        Gt[a][k] = column[a];
+    }
+  }
 };
 
-template <typename Surface, typename ResidualPolicy>
-HOLDFAST_INLINE void
-differentiate(const Surface& surface, const Local& p, ParameterDerivatives<Surface>& d)
-{
-  surface.shape(p.q, p.g, d.f, d.B);
-  surface.applyShapeG(p.t, p.Gt, d.Gt);
-  if (ResidualPolicy::kUsesCurvature) {
-    Number Gr[3];
-    surface.applyG(p.r, Gr);
-    surface.applyShapeG(p.r, Gr, d.Gr);
-  }
-  HOLDFAST_UNROLL
-  for (int i = 0; i < Surface::kTranslations; ++i) {
-    double u[3];
-    surface.direction(i, u);
-    const Number direction[3] = {Number(u[0]), Number(u[1]), Number(u[2])};
-    const int a = Surface::kShape + i;
-    Number Gu[3];
-    surface.applyG(direction, Gu);
-    d.f[a] = 0.0 - dot(p.g, direction);
-    HOLDFAST_UNROLL
-    for (int k = 0; k < 3; ++k)
-      d.B[a][k] = 0.0 - Gu[k];
-  }
-}
+// A point with the derivatives of its E. E depends on theta and q through f, g and G:
+// dE = E_f df + mu.dg + E_w t^T dG t / 2 with mu = 2 E_V t + E_w r.
+struct Expansion : Local<LocalNoise> {
+  Number E, E_f, twice_E_V, E_w, mu[3];
+  SecondPartials second;
 
-// w_a = B_a.r + t^T G_a t / 2.
-template <typename Surface>
-HOLDFAST_INLINE Number
-curvatureDerivative(const Local& p, const ParameterDerivatives<Surface>& d, int a)
-{
-  const Number linear = dot(d.B[a], p.r);
-  return a < Surface::kShape ?
-             linear + dot(p.t, d.Gt[a < Surface::kShape ? a : 0]) * 0.5 :
-             linear;
-}
-
-// X_a = d^2E / dtheta_a dq by the chain rule through f, V, w; also u_a = Sigma B_a and
-// h_a = G u_a + G_a t, which the Hessian needs again.
-template <typename Surface, typename ResidualPolicy>
-HOLDFAST_INLINE void
-crossTerm(const Surface& surface,
-          const Local& p,
-          const ParameterDerivatives<Surface>& d,
-          const Partials& E,
-          int a,
-          Number slope[3],
-          Number u[3],
-          Number h[3],
-          Number X[3])
-{
-  const bool shape = a < Surface::kShape;
-  const int b = shape ? a : 0;
-  multiply(p.S, d.B[a], u);
-  surface.applyG(u, h);
-  HOLDFAST_UNROLL
-  for (int i = 0; i < 3 && shape; ++i)
-    h[i] = h[i] + d.Gt[b][i];
-  const Number f_a = d.f[a], V_a = dot(d.B[a], p.t) * 2.0;
-  slope[0] = E.ff * f_a + E.fV * V_a;
-  slope[1] = E.fV * f_a + E.VV * V_a;
-  if (ResidualPolicy::kUsesCurvature) {
-    const Number w_a = curvatureDerivative(p, d, a);
-    slope[0] = slope[0] + E.fw * w_a;
-    slope[1] = slope[1] + E.Vw * w_a;
-    slope[2] = E.fw * f_a + E.Vw * V_a + E.ww * w_a;
+  template <typename ResidualPolicy>
+  HOLDFAST_INLINE void expand()
+  {
+    const ResidualPolicy residual(f, V, w, weight);
+    const ScaledResidual e = residual.first();
+    const Number scale = residual.inverse * e.e;
+    E = scale * e.e * 0.5;
+    E_f = scale * e.f;
+    twice_E_V = scale * e.V * 2.0;
+    E_w = scale * e.w;
+    slopeInG(*this, scale * e.V, E_w, mu);
+    second = residual.second();
   }
+};
+
+// Derivatives along theta_a of E_f, mu, E_w and t, and X_a = d^2E / dtheta_a dq:
+//   t_a = Sigma B_a,
+//   mu_a = Sigma (2 E_Va g + E_wa G t + 2 E_V B_a + E_w (G t_a + G_a t)),
+// and from E_q = E_f g + G mu,  X_a = E_fa g + E_f B_a + G mu_a + G_a mu.
+struct Along {
+  Number E_f, E_w, mu[3], t[3], X[3];
+};
+
+template <int a, typename ResidualPolicy, typename Surface>
+HOLDFAST_INLINE void
+differentiateAlong(const Surface& surface,
+                   const Expansion& p,
+                   const SurfaceDerivatives<Surface>& d,
+                   Along& along)
+{
+  const SecondPartials& E = p.second;
+  const Number* B = d.B[a];
+  const Number f_a = d.f[a], V_a = dot(B, p.t) * 2.0;
+  Number E_Va = E.fV * f_a + E.VV * V_a, change[3], G_mu_a[3];
+  along.E_f = E.ff * f_a + E.fV * V_a;
+  if (ResidualPolicy::kUsesCurvature) {
+    const Number w_a = dot(B, p.r) + d.tGt[a];
+    along.E_f = along.E_f + E.fw * w_a;
+    along.E_w = E.fw * f_a + E.Vw * V_a + E.ww * w_a;
+    E_Va = E_Va + E.Vw * w_a;
+  }
+  const Number twice_E_Va = E_Va * 2.0;
   HOLDFAST_UNROLL
   for (int i = 0; i < 3; ++i)
-    X[i] =
-        slope[0] * p.g[i] + (slope[1] * p.Gt[i] + E.V * h[i]) * 2.0 + E.f * d.B[a][i];
+    change[i] = p.g[i] * twice_E_Va + B[i] * p.twice_E_V;
   if (ResidualPolicy::kUsesCurvature) {
-    Number Gr[3], Sh[3], GSh[3];
-    surface.applyG(p.r, Gr);
-    multiply(p.S, h, Sh);
-    surface.applyG(Sh, GSh);
+    Number G_t_a[3];
+    multiply(p.noise.S, B, along.t);
+    surface.applyG(along.t, G_t_a);
     HOLDFAST_UNROLL
-    for (int i = 0; i < 3; ++i) {
-      X[i] = X[i] + slope[2] * Gr[i] + E.w * GSh[i];
-      if (shape)
-        X[i] = X[i] + E.w * d.Gr[b][i];
-    }
+    for (int i = 0; i < 3; ++i)
+      change[i] = change[i] + p.Gt[i] * along.E_w + (G_t_a[i] + d.Gt[a][i]) * p.E_w;
+  }
+  multiply(p.noise.S, change, along.mu);
+  surface.applyG(along.mu, G_mu_a);
+  HOLDFAST_UNROLL
+  for (int k = 0; k < 3; ++k) {
+    Number row[kPolynomials], G_a_mu[d.kCount];
+    hessianRow(k, p.mu, row);
+    surface.combine(row, G_a_mu);
+    along.X[k] = p.g[k] * along.E_f + B[k] * p.E_f + G_mu_a[k] + G_a_mu[a];
   }
 }
 
 // ---- The sums ---------------------------------------------------------------------
-
-template <typename Surface, typename ResidualPolicy>
-void
-normalSums(const Points& points, const State& state, NormalSums& out)
-{
-  constexpr int p = ParameterDerivatives<Surface>::kCount;
-  constexpr int kTriangle = p * (p + 1) / 2;
-  const Surface surface{state};
-  Number cost(0.0), L[kPolynomials], JtJ[kTriangle];
-  for (Number& sum : L)
-    sum = Number(0.0);
-  for (Number& sum : JtJ)
-    sum = Number(0.0);
-  for (int i = 0; i < points.padded_size; i += kLanes) {
-    Local local;
-    enterFrame<Surface, ResidualPolicy>(surface, points, i, local);
-    Partials E;
-    ResidualGradient e;
-    ResidualPolicy::evaluate(local.f, local.V, local.w, E, e);
-    applyWeight(local.weight, E);
-    cost = cost + E.E;
-    addPolynomials(local, E, L);
-
-    ParameterDerivatives<Surface> d;
-    differentiate<Surface, ResidualPolicy>(surface, local, d);
-    Number J[p];
-    HOLDFAST_UNROLL
-    for (int a = 0; a < p; ++a) {
-      J[a] = e.f * d.f[a] + e.V * dot(d.B[a], local.t) * 2.0;
-      if (ResidualPolicy::kUsesCurvature)
-        J[a] = J[a] + e.w * curvatureDerivative(local, d, a);
-      J[a] = J[a] * local.weight;
-    }
-    HOLDFAST_UNROLL
-    for (int a = 0, entry = 0; a < p; ++a)
-      HOLDFAST_UNROLL
-    for (int b = a; b < p; ++b, ++entry)
-      JtJ[entry] = JtJ[entry] + J[a] * J[b];
-  }
-  out.cost = sumOfLanes(cost);
-  HOLDFAST_UNROLL
-  for (int i = 0; i < kPolynomials; ++i)
-    out.L[i] = sumOfLanes(L[i]);
-  HOLDFAST_UNROLL
-  for (int i = 0; i < kTriangle; ++i)
-    out.JtJ[i] = sumOfLanes(JtJ[i]);
-}
-
-template <int p, int shape>
-struct CovarianceAccumulators {
-  Number cost, L[kPolynomials], H[shape * (shape + 1) / 2];
-  Number X[p][3], XX[p * (p + 1) / 2], XS[p][3], XSq[p][6];
-  Number S[6], qS[3][6], qqS[6][6];
-};
-
-// Sums that do not depend on the surface: how the points' noise moves their moments.
-template <int p, int shape>
-HOLDFAST_INLINE void
-addMoments(const Local& local,
-           const Number qt[3],
-           CovarianceAccumulators<p, shape>& sums)
-{
-  Number qS[3][6];
-  HOLDFAST_UNROLL
-  for (int e = 0; e < 6; ++e) {
-    sums.S[e] = sums.S[e] + local.S[e];
-    HOLDFAST_UNROLL
-    for (int a = 0; a < 3; ++a) {
-      qS[a][e] = qt[a] * local.S[e];
-      sums.qS[a][e] = sums.qS[a][e] + qS[a][e];
-    }
-  }
-  HOLDFAST_UNROLL
-  for (int a = 0, pair = 0; a < 3; ++a)
-    HOLDFAST_UNROLL
-  for (int b = a; b < 3; ++b, ++pair)
-    HOLDFAST_UNROLL
-  for (int e = 0; e < 6; ++e)
-    sums.qqS[pair][e] = sums.qqS[pair][e] + qt[b] * qS[a][e];
-}
-
-template <typename Surface, typename ResidualPolicy, int p, int shape>
-HOLDFAST_INLINE void
-addSecondDerivatives(const Surface& surface,
-                     const Local& local,
-                     const Partials& E,
-                     const Number qt[3],
-                     CovarianceAccumulators<p, shape>& sums)
-{
-  ParameterDerivatives<Surface> d;
-  differentiate<Surface, ResidualPolicy>(surface, local, d);
-  Number slope[p][3], u[p][3], h[p][3], X[p][3], XS[p][3];
-  HOLDFAST_UNROLL
-  for (int a = 0; a < p; ++a) {
-    crossTerm<Surface,
-              ResidualPolicy>(surface, local, d, E, a, slope[a], u[a], h[a], X[a]);
-    multiply(local.S, X[a], XS[a]);
-  }
-  HOLDFAST_UNROLL
-  for (int a = 0, entry = 0; a < shape; ++a)
-    HOLDFAST_UNROLL
-  for (int b = a; b < shape; ++b, ++entry) {
-    Number H = slope[a][0] * d.f[b] +
-               (slope[a][1] * dot(d.B[b], local.t) + E.V * dot(u[a], d.B[b])) * 2.0;
-    if (ResidualPolicy::kUsesCurvature)
-      H = H + slope[a][2] * curvatureDerivative(local, d, b) +
-          E.w * (dot(u[a], h[b]) + dot(u[b], d.Gt[a]));
-    sums.H[entry] = sums.H[entry] + H;
-  }
-  HOLDFAST_UNROLL
-  for (int a = 0, entry = 0; a < p; ++a) {
-    HOLDFAST_UNROLL
-    for (int b = a; b < p; ++b, ++entry)
-      sums.XX[entry] = sums.XX[entry] + dot(X[a], XS[b]);
-    HOLDFAST_UNROLL
-    for (int i = 0; i < 3; ++i) {
-      sums.X[a][i] = sums.X[a][i] + X[a][i];
-      sums.XS[a][i] = sums.XS[a][i] + XS[a][i];
-    }
-    HOLDFAST_UNROLL
-    for (int i = 0, pair = 0; i < 3; ++i)
-      HOLDFAST_UNROLL
-    for (int j = i; j < 3; ++j, ++pair)
-      sums.XSq[a][pair] = sums.XSq[a][pair] + (XS[a][i] * qt[j] + XS[a][j] * qt[i]);
-  }
-}
-
-template <int p, int shape>
-void
-reduce(const CovarianceAccumulators<p, shape>& sums, CovarianceSums& out)
-{
-  out.cost = sumOfLanes(sums.cost);
-  HOLDFAST_UNROLL
-  for (int i = 0; i < kPolynomials; ++i)
-    out.L[i] = sumOfLanes(sums.L[i]);
-  HOLDFAST_UNROLL
-  for (int i = 0; i < shape * (shape + 1) / 2; ++i)
-    out.H[i] = sumOfLanes(sums.H[i]);
-  HOLDFAST_UNROLL
-  for (int i = 0; i < p * (p + 1) / 2; ++i)
-    out.XX[i] = sumOfLanes(sums.XX[i]);
-  HOLDFAST_UNROLL
-  for (int a = 0; a < p; ++a) {
-    HOLDFAST_UNROLL
-    for (int i = 0; i < 3; ++i) {
-      out.X[a][i] = sumOfLanes(sums.X[a][i]);
-      out.XS[a][i] = sumOfLanes(sums.XS[a][i]);
-    }
-    HOLDFAST_UNROLL
-    for (int i = 0; i < 6; ++i)
-      out.XSq[a][i] = sumOfLanes(sums.XSq[a][i]);
-  }
-  HOLDFAST_UNROLL
-  for (int e = 0; e < 6; ++e) {
-    out.S[e] = sumOfLanes(sums.S[e]);
-    HOLDFAST_UNROLL
-    for (int a = 0; a < 3; ++a)
-      out.qS[a][e] = sumOfLanes(sums.qS[a][e]);
-    HOLDFAST_UNROLL
-    for (int pair = 0; pair < 6; ++pair)
-      out.qqS[pair][e] = sumOfLanes(sums.qqS[pair][e]);
-  }
-}
 
 template <typename Sums>
 HOLDFAST_INLINE void
@@ -732,62 +518,366 @@ setZero(Sums& sums)
     entry[i] = Number(0.0);
 }
 
+template <int n>
+HOLDFAST_INLINE void
+copy(const Number (&from)[n], Number (&to)[n])
+{
+  HOLDFAST_UNROLL
+  for (int i = 0; i < n; ++i)
+    to[i] = from[i];
+}
+
+// Sums over the lanes of accumulators.
+template <int n>
+HOLDFAST_INLINE void
+reduce(const Number (&sums)[n], double* out)
+{
+  for (int i = 0; i < n; ++i)
+    out[i] = sumOfLanes(sums[i]);
+}
+
+// Blocks of points between two steps of the work on them. In one step per block, the
+// accumulators would not fit the registers, and divisions and roots would be waited
+// for; a tile stays in the first cache.
+constexpr int kTile = 8;
+
+HOLDFAST_INLINE int
+tileSize(const Points& points, int first)
+{
+  return std::min(kTile, (points.padded_size - first) / kLanes);
+}
+
+template <int p>
+struct NormalSlot {
+  Number q[3], t[3];
+  Number e, f, mu[3], w; // sqrt(V) times the residual, derivatives in f, g and G
+  Number inverse; // 1 / V
+  Number J[p];
+};
+
+template <int p>
+struct NormalAccumulators {
+  Number cost, L[kPolynomials], JtJ[p * (p + 1) / 2];
+};
+
+template <typename ResidualPolicy, typename Surface, int p>
+HOLDFAST_INLINE void
+fillSlot(const Surface& surface, const Points& points, int i, NormalSlot<p>& slot)
+{
+  Local<BatchNoise> local;
+  enterFrame<ResidualPolicy>(surface, points, i, local);
+  const ResidualPolicy residual(local.f, local.V, local.w, local.weight);
+  const ScaledResidual e = residual.first();
+  copy(local.q, slot.q), copy(local.t, slot.t);
+  slot.e = e.e, slot.f = e.f, slot.w = e.w;
+  slot.inverse = residual.inverse;
+  slopeInG(local, e.V, e.w, slot.mu);
+}
+
+// Adds to the cost and to L, and leaves J in the tile. L[p] = e e[p], and J, both come
+// from e[p], the change of e along p.
+template <typename Surface, int p>
+HOLDFAST_INLINE void
+addGradient(const Surface& surface,
+            NormalSlot<p>* tile,
+            int size,
+            NormalAccumulators<p>& sums)
+{
+  Number cost = sums.cost, L[kPolynomials];
+  copy(sums.L, L);
+  for (NormalSlot<p>* slot = tile; slot != tile + size; ++slot) {
+    const Number scale = slot->inverse * slot->e;
+    Number change[kPolynomials];
+    changeAlong(slot->q, slot->t, slot->f, slot->mu, slot->w, change);
+    cost = cost + scale * slot->e * 0.5;
+    HOLDFAST_UNROLL
+    for (int k = 0; k < kPolynomials; ++k)
+      L[k] = L[k] + scale * change[k];
+    surface.combine(change, slot->J);
+  }
+  sums.cost = cost;
+  copy(L, sums.L);
+}
+
+template <int p>
+HOLDFAST_INLINE void
+addJtJ(const NormalSlot<p>* tile, int size, NormalAccumulators<p>& sums)
+{
+  Number JtJ[p * (p + 1) / 2];
+  copy(sums.JtJ, JtJ);
+  for (const NormalSlot<p>* slot = tile; slot != tile + size; ++slot) {
+    HOLDFAST_UNROLL
+    for (int a = 0; a < p; ++a) {
+      const Number J_over_V = slot->J[a] * slot->inverse;
+      HOLDFAST_UNROLL
+      for (int b = a; b < p; ++b)
+        JtJ[packed(a, b, p)] = JtJ[packed(a, b, p)] + J_over_V * slot->J[b];
+    }
+  }
+  copy(JtJ, sums.JtJ);
+}
+
+template <typename Surface, typename ResidualPolicy>
+void
+normalSums(const Points& points, const State& state, NormalSums& out)
+{
+  constexpr int p = parameterCount(Surface::kModel);
+  const Surface surface{state};
+  NormalAccumulators<p> sums;
+  setZero(sums);
+  NormalSlot<p> tile[kTile];
+  for (int first = 0; first < points.padded_size; first += kTile * kLanes) {
+    const int size = tileSize(points, first);
+    for (int i = 0; i < size; ++i)
+      fillSlot<ResidualPolicy>(surface, points, first + i * kLanes, tile[i]);
+    addGradient(surface, tile, size, sums);
+    addJtJ(tile, size, sums);
+  }
+  double L[kPolynomials];
+  reduce(sums.L, L);
+  surface.combine(L, out.gradient);
+  out.cost = sumOfLanes(sums.cost);
+  reduce(sums.JtJ, out.JtJ);
+}
+
+// A tile of the covariance pass.
+template <int p>
+struct Tile {
+  int size;
+  Expansion point[kTile];
+  Number qt[kTile][3], X[kTile][p][3];
+};
+
+template <int p, int shape>
+struct CovarianceAccumulators {
+  Number cost, L[kPolynomials], H[shape * (shape + 1) / 2];
+  Number X[p][3], XX[p * (p + 1) / 2], XS[p][3], XSq[p][6];
+  Number S[6], qS[3][6], qqS[6][6];
+};
+
+template <int p, int shape>
+void
+reduce(const CovarianceAccumulators<p, shape>& sums, CovarianceSums& out)
+{
+  out.cost = sumOfLanes(sums.cost);
+  reduce(sums.L, out.L);
+  reduce(sums.H, out.H);
+  reduce(sums.XX, out.XX);
+  for (int a = 0; a < p; ++a) {
+    reduce(sums.X[a], out.X[a]);
+    reduce(sums.XS[a], out.XS[a]);
+    reduce(sums.XSq[a], out.XSq[a]);
+    for (const int diagonal : {0, 3, 5})
+      out.XSq[a][diagonal] *= 2.0; // summed once
+  }
+  reduce(sums.S, out.S);
+  for (int k = 0; k < 3; ++k)
+    reduce(sums.qS[k], out.qS[k]);
+  for (int pair = 0; pair < 6; ++pair)
+    reduce(sums.qqS[pair], out.qqS[pair]);
+}
+
+// Adds row a of H, and leaves X_a in the tile.
+template <int a, typename ResidualPolicy, typename Surface, int p, int shape>
+HOLDFAST_INLINE void
+addHessianRow(const Surface& surface,
+              Tile<p>& tile,
+              CovarianceAccumulators<p, shape>& sums)
+{
+  constexpr int columns = a < shape ? a + 1 : 0;
+  Number H[columns + 1];
+  HOLDFAST_UNROLL
+  for (int b = 0; b < columns; ++b)
+    H[b] = sums.H[packed(b, a, shape)];
+  for (int i = 0; i < tile.size; ++i) {
+    const Expansion& point = tile.point[i];
+    const SurfaceDerivatives<Surface> d(surface, point.q, point.t);
+    Along along;
+    differentiateAlong<a, ResidualPolicy>(surface, point, d, along);
+    copy(along.X, tile.X[i][a]);
+    HOLDFAST_UNROLL
+    for (int b = 0; b < columns; ++b) {
+      H[b] = H[b] + along.E_f * d.f[b] + dot(d.B[b], along.mu);
+      if (ResidualPolicy::kUsesCurvature)
+        H[b] = H[b] + along.E_w * d.tGt[b] + dot(d.Gt[b], along.t) * point.E_w;
+    }
+  }
+  HOLDFAST_UNROLL
+  for (int b = 0; b < columns; ++b)
+    sums.H[packed(b, a, shape)] = H[b];
+}
+
+// Sums over a tile of what X_a is multiplied with.
+template <int a, int p, int shape>
+HOLDFAST_INLINE void
+addCrossRow(const Tile<p>& tile, CovarianceAccumulators<p, shape>& sums)
+{
+  constexpr int first = packed(a, a, p);
+  Number X[3], XS[3], XSq[6], XX[p - a];
+  copy(sums.X[a], X), copy(sums.XS[a], XS), copy(sums.XSq[a], XSq);
+  HOLDFAST_UNROLL
+  for (int b = a; b < p; ++b)
+    XX[b - a] = sums.XX[first + b - a];
+  for (int i = 0; i < tile.size; ++i) {
+    const Number* qt = tile.qt[i];
+    Number noisy[3];
+    multiply(tile.point[i].noise.S, tile.X[i][a], noisy);
+    HOLDFAST_UNROLL
+    for (int k = 0, pair = 0; k < 3; ++k) {
+      X[k] = X[k] + tile.X[i][a][k];
+      XS[k] = XS[k] + noisy[k];
+      HOLDFAST_UNROLL
+      for (int j = k; j < 3; ++j, ++pair) {
+        XSq[pair] = XSq[pair] + noisy[k] * qt[j];
+        if (j != k)
+          XSq[pair] = XSq[pair] + noisy[j] * qt[k];
+      }
+    }
+    HOLDFAST_UNROLL
+    for (int b = a; b < p; ++b)
+      XX[b - a] = XX[b - a] + dot(noisy, tile.X[i][b]);
+  }
+  copy(X, sums.X[a]), copy(XS, sums.XS[a]), copy(XSq, sums.XSq[a]);
+  HOLDFAST_UNROLL
+  for (int b = a; b < p; ++b)
+    sums.XX[first + b - a] = XX[b - a];
+}
+
+// Sums of entry e of Sigma, which do not depend on the surface: how the noise of the
+// points moves their moments.
+template <int p, int shape>
+HOLDFAST_INLINE void
+addMoments(int e, const Tile<p>& tile, CovarianceAccumulators<p, shape>& sums)
+{
+  Number S = sums.S[e], qS[3], qqS[6];
+  HOLDFAST_UNROLL
+  for (int k = 0; k < 3; ++k)
+    qS[k] = sums.qS[k][e];
+  HOLDFAST_UNROLL
+  for (int pair = 0; pair < 6; ++pair)
+    qqS[pair] = sums.qqS[pair][e];
+  for (int i = 0; i < tile.size; ++i) {
+    S = S + tile.point[i].noise.S[e];
+    HOLDFAST_UNROLL
+    for (int a = 0, pair = 0; a < 3; ++a) {
+      const Number product = tile.qt[i][a] * tile.point[i].noise.S[e];
+      qS[a] = qS[a] + product;
+      HOLDFAST_UNROLL
+      for (int b = a; b < 3; ++b, ++pair)
+        qqS[pair] = qqS[pair] + product * tile.qt[i][b];
+    }
+  }
+  sums.S[e] = S;
+  HOLDFAST_UNROLL
+  for (int k = 0; k < 3; ++k)
+    sums.qS[k][e] = qS[k];
+  HOLDFAST_UNROLL
+  for (int pair = 0; pair < 6; ++pair)
+    sums.qqS[pair][e] = qqS[pair];
+}
+
+template <typename ResidualPolicy, typename Surface, int p, int shape, int... a>
+HOLDFAST_INLINE void
+addTile(const Surface& surface,
+        Tile<p>& tile,
+        CovarianceAccumulators<p, shape>& sums,
+        std::integer_sequence<int, a...>)
+{
+  (addHessianRow<a, ResidualPolicy>(surface, tile, sums), ...);
+  (addCrossRow<a>(tile, sums), ...);
+  for (int e = 0; e < 6; ++e)
+    addMoments(e, tile, sums);
+}
+
 template <typename Surface, typename ResidualPolicy>
 void
 covarianceSums(const Points& points, const State& state, CovarianceSums& out)
 {
-  constexpr int p = ParameterDerivatives<Surface>::kCount;
+  constexpr int p = parameterCount(Surface::kModel);
+  constexpr int shape = shapeParameterCount(Surface::kModel);
   const Surface surface{state};
-  CovarianceAccumulators<p, Surface::kShape> sums;
+  CovarianceAccumulators<p, shape> sums;
   setZero(sums);
-  for (int i = 0; i < points.padded_size; i += kLanes) {
-    Local local;
-    enterFrame<Surface, ResidualPolicy>(surface, points, i, local);
-    Partials E;
-    ResidualGradient e;
-    ResidualPolicy::evaluate(local.f, local.V, local.w, E, e);
-    ResidualPolicy::second(local.f, local.V, local.w, E);
-    applyWeight(local.weight, E);
-    applyWeightToSecond(local.weight, E);
-    sums.cost = sums.cost + E.E;
-    addPolynomials(local, E, sums.L);
-    Number qt[3];
-    HOLDFAST_UNROLL
-    for (int k = 0; k < 3; ++k)
-      qt[k] = local.q[k] - state.centroid[k];
-    addMoments(local, qt, sums);
-    addSecondDerivatives<Surface, ResidualPolicy>(surface, local, E, qt, sums);
+  Tile<p> tile;
+  for (int first = 0; first < points.padded_size; first += kTile * kLanes) {
+    tile.size = tileSize(points, first);
+    for (int i = 0; i < tile.size; ++i)
+      enterFrame<ResidualPolicy>(surface, points, first + i * kLanes, tile.point[i]);
+    for (int i = 0; i < tile.size; ++i) {
+      Expansion& point = tile.point[i];
+      point.expand<ResidualPolicy>();
+      sums.cost = sums.cost + point.E;
+      Number L[kPolynomials];
+      changeAlong(point.q, point.t, point.E_f, point.mu, point.E_w, L);
+      HOLDFAST_UNROLL
+      for (int k = 0; k < kPolynomials; ++k)
+        sums.L[k] = sums.L[k] + L[k];
+      HOLDFAST_UNROLL
+      for (int k = 0; k < 3; ++k)
+        tile.qt[i][k] = point.q[k] - state.centroid[k];
+    }
+    addTile<ResidualPolicy>(surface, tile, sums, std::make_integer_sequence<int, p>());
   }
   reduce(sums, out);
+  surface.combine(out.L, out.gradient);
 }
 
-// X_i of every point, padding included: p x 3 x kLanes values per step.
+template <typename ResidualPolicy, typename Surface, int... a>
+void
+crossTermsOf(const Surface& surface,
+             const Expansion& point,
+             double* out,
+             std::integer_sequence<int, a...>)
+{
+  const SurfaceDerivatives<Surface> d(surface, point.q, point.t);
+  Along along[sizeof...(a)];
+  (differentiateAlong<a, ResidualPolicy>(surface, point, d, along[a]), ...);
+  for (const Along& parameter : along)
+    for (const Number& X : parameter.X)
+      *out++ = sumOfLanes(X);
+}
+
+// X_i of every point, padding included: p x 3 values per step.
 template <typename Surface, typename ResidualPolicy>
 void
 crossTermsOfPoints(const Points& points, const State& state, double* out)
 {
-  constexpr int p = ParameterDerivatives<Surface>::kCount;
+  constexpr int p = parameterCount(Surface::kModel);
   const Surface surface{state};
-  for (int i = 0; i < points.padded_size; i += kLanes) {
-    Local local;
-    enterFrame<Surface, ResidualPolicy>(surface, points, i, local);
-    Partials E;
-    ResidualGradient e;
-    ResidualPolicy::evaluate(local.f, local.V, local.w, E, e);
-    ResidualPolicy::second(local.f, local.V, local.w, E);
-    applyWeight(local.weight, E);
-    applyWeightToSecond(local.weight, E);
-    ParameterDerivatives<Surface> d;
-    differentiate<Surface, ResidualPolicy>(surface, local, d);
-    HOLDFAST_UNROLL
-    for (int a = 0; a < p; ++a, out += 3) {
-      Number slope[3], u[3], h[3], X[3];
-      crossTerm<Surface, ResidualPolicy>(surface, local, d, E, a, slope, u, h, X);
-      HOLDFAST_UNROLL
-      for (int k = 0; k < 3; ++k)
-        out[k] = sumOfLanes(X[k]);
-    }
+  for (int i = 0; i < points.padded_size; i += kLanes, out += 3 * p) {
+    Expansion point;
+    enterFrame<ResidualPolicy>(surface, points, i, point);
+    point.expand<ResidualPolicy>();
+    crossTermsOf<ResidualPolicy>(surface,
+                                 point,
+                                 out,
+                                 std::make_integer_sequence<int, p>());
   }
+}
+
+// How many points from the first on, in steps of kLanes, are surely valid: coordinates
+// finite and the covariance positive definite, by leading minors. NaN fails every
+// comparison, and what overflows is not below the limit.
+inline int
+leadingValid(const Points& points)
+{
+  const Number zero(0.0), limit(std::numeric_limits<double>::max());
+  int i = 0;
+  for (; i < points.padded_size; i += kLanes) {
+    Number q[3], S[6];
+    loadPoint(points, i, q, S);
+    const Number sum = q[0] + q[1] + q[2];
+    const Number minor = S[0] * S[3] - S[1] * S[1];
+    const Number determinant = S[5] * minor + S[1] * S[2] * S[4] * 2.0 -
+                               (S[0] * S[4] * S[4] + S[3] * S[2] * S[2]);
+    // Padding has no covariance.
+    const Number padding = 1.0 - load(points.channel[9] + i);
+    if (!(allLess(zero, S[0] + padding) && allLess(zero, minor + padding) &&
+          allLess(zero, determinant + padding) && allLess(determinant, limit) &&
+          allLess(sum, limit) && allLess(0.0 - limit, sum)))
+      break;
+  }
+  return i;
 }
 
 inline void

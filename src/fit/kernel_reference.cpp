@@ -1,6 +1,9 @@
 #include <holdfast/fit/kernel.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #define HOLDFAST_INLINE inline
 #define HOLDFAST_UNROLL
@@ -41,6 +44,12 @@ selectLess(double a, double b, double x, double y)
   return a < b ? x : y;
 }
 
+bool
+allLess(double a, double b)
+{
+  return a < b;
+}
+
 #include "kernel_point.inl"
 
 struct CrossTermAction {
@@ -52,7 +61,7 @@ struct CrossTermAction {
   void run() const
   {
     X.resize(static_cast<std::size_t>(points.padded_size) * 3 *
-             ParameterDerivatives<Surface>::kCount);
+             parameterCount(Surface::kModel));
     crossTermsOfPoints<Surface, ResidualPolicy>(points, state, X.data());
   }
 };
@@ -70,6 +79,12 @@ crossTerms(Model model,
 }
 
 namespace reference {
+
+int
+countLeadingValid(const Points& points)
+{
+  return leadingValid(points);
+}
 
 void
 accumulateScatter(const Points& points, ScatterSums& sums)

@@ -2,6 +2,10 @@
 // (Highway).
 #include <holdfast/fit/kernel.h>
 
+#include <algorithm>
+#include <limits>
+#include <utility>
+
 #ifdef HOLDFAST_HAVE_HIGHWAY
 
 #undef HWY_DISABLED_TARGETS
@@ -15,7 +19,7 @@
 #include <hwy/highway.h>
 
 #define HOLDFAST_INLINE HWY_INLINE
-#define HOLDFAST_UNROLL _Pragma("GCC unroll 16")
+#define HOLDFAST_UNROLL _Pragma("GCC unroll 32")
 
 HWY_BEFORE_NAMESPACE();
 namespace holdfast { namespace kernel { namespace HWY_NAMESPACE {
@@ -83,6 +87,12 @@ selectLess(Number a, Number b, Number x, Number y)
   return Number(hn::IfThenElse(hn::Lt(a.v, b.v), x.v, y.v));
 }
 
+HWY_INLINE bool
+allLess(Number a, Number b)
+{
+  return hn::AllTrue(kTag, hn::Lt(a.v, b.v));
+}
+
 #include "kernel_point.inl"
 
 const char*
@@ -92,6 +102,12 @@ targetName()
 }
 
 // Exported under names of their own: the shared file overloads its functions.
+int
+dispatchedLeadingValid(const Points& points)
+{
+  return leadingValid(points);
+}
+
 void
 dispatchedScatter(const Points& points, ScatterSums& sums)
 {
@@ -145,6 +161,7 @@ HWY_AFTER_NAMESPACE();
 namespace holdfast { namespace kernel {
 
 HWY_EXPORT(targetName);
+HWY_EXPORT(dispatchedLeadingValid);
 HWY_EXPORT(dispatchedScatter);
 HWY_EXPORT(dispatchedQuadric);
 HWY_EXPORT(dispatchedNormal);
@@ -155,6 +172,12 @@ const char*
 instructionSet()
 {
   return HWY_DYNAMIC_DISPATCH(targetName)();
+}
+
+int
+countLeadingValid(const Points& points)
+{
+  return HWY_DYNAMIC_DISPATCH(dispatchedLeadingValid)(points);
 }
 
 void
@@ -214,6 +237,12 @@ const char*
 instructionSet()
 {
   return "scalar";
+}
+
+int
+countLeadingValid(const Points& points)
+{
+  return reference::countLeadingValid(points);
 }
 
 void

@@ -1,4 +1,5 @@
 #include <holdfast/fit/point_batch.h>
+#include <holdfast/fit/surface_fit.h>
 #include <holdfast/geometry/gaussian.h>
 
 #include <algorithm>
@@ -39,7 +40,9 @@ PointBatch::reserve(int n)
 {
   if (n <= capacity_)
     return;
-  const int capacity = roundedUp(n);
+  // An odd number of cache lines: at a power of two, all channels of a point would
+  // compete for one set of the cache.
+  const int capacity = roundedUp(n) | kLaneMultiple;
   const std::size_t bytes =
       sizeof(double) * kChannels * static_cast<std::size_t>(capacity);
   std::unique_ptr<double[], Deleter> data(
@@ -81,13 +84,11 @@ PointBatch::add(const Eigen::Vector3d& point, const Eigen::Matrix3d& covariance)
 
 namespace {
 
-// Cheap test that accepts almost every sound covariance: leading minors of a positive
-// definite matrix. What it does not accept is looked at properly.
 bool
-surelyPositiveDefinite(const Eigen::Matrix3d& S)
+isValid(const PointBatch& batch, int i)
 {
-  const double minor = S(0, 0) * S(1, 1) - S(0, 1) * S(0, 1);
-  return S(0, 0) > 0.0 && minor > 0.0 && S.determinant() > 0.0 && S.allFinite();
+  return (batch.point(i) - batch.origin()).allFinite() &&
+         isPositiveSemiDefinite(batch.covariance(i));
 }
 
 } // namespace
@@ -95,12 +96,11 @@ surelyPositiveDefinite(const Eigen::Matrix3d& S)
 int
 PointBatch::removeInvalid()
 {
-  int kept = 0;
-  for (int i = 0; i < size_; ++i) {
-    const Eigen::Matrix3d S = covariance(i);
-    const double sum = channel(X)[i] + channel(Y)[i] + channel(Z)[i];
-    if (!std::isfinite(sum) ||
-        !(surelyPositiveDefinite(S) || isPositiveSemiDefinite(S)))
+  pad();
+  const int start = std::min(size_, kernel::countLeadingValid(kernelPoints(*this)));
+  int kept = start;
+  for (int i = start; i < size_; ++i) {
+    if (!isValid(*this, i))
       continue;
     if (kept != i)
       for (int c = 0; c < kChannels; ++c)
@@ -116,12 +116,13 @@ void
 PointBatch::applyFloor(double sigma_floor_m)
 {
   const double floor = sigma_floor_m * sigma_floor_m;
-  for (int i = 0; i < size_; ++i)
-    if (channel(SXX)[i] + channel(SYY)[i] + channel(SZZ)[i] < floor) {
-      channel(SXX)[i] += floor;
-      channel(SYY)[i] += floor;
-      channel(SZZ)[i] += floor;
-    }
+  double *xx = channel(SXX), *yy = channel(SYY), *zz = channel(SZZ);
+  for (int i = 0; i < size_; ++i) {
+    const double raise = xx[i] + yy[i] + zz[i] < floor ? floor : 0.0;
+    xx[i] += raise;
+    yy[i] += raise;
+    zz[i] += raise;
+  }
 }
 
 void

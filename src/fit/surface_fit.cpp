@@ -26,57 +26,6 @@ constexpr double kSmallestPivot = 1e-10;
 // trouble.
 constexpr int kMaxPolishSteps = 12;
 
-// The gradient E_theta = L[f_theta] for the shape parameters, and E_c (local axes).
-void
-shapeGradient(const UnboundedSurface& surface, const double L[], Theta& gradient)
-{
-  using namespace kernel;
-  const Eigen::Vector3d& k = surface.k;
-  switch (surface.model) {
-  case Model::Paraboloid:
-    gradient[0] = L[PXX];
-    gradient[1] = 2.0 * L[PXY];
-    gradient[2] = L[PYY];
-    gradient[3] = 2.0 * (k[1] * L[PXZ] + k[2] * L[PYZ] + L[PY]);
-    gradient[4] = -2.0 * (k[0] * L[PXZ] + k[1] * L[PYZ] + L[PX]);
-    break;
-  case Model::Sphere:
-    gradient[0] = L[PXX] + L[PYY] + L[PZZ];
-    break;
-  case Model::Cylinder:
-    gradient[0] = L[PYY] + L[PZZ];
-    gradient[1] = 2.0 * (k[0] * L[PXZ] - L[PX]);
-    gradient[2] = -2.0 * k[0] * L[PXY];
-    break;
-  case Model::Plane:
-    gradient[0] = 2.0 * L[PY];
-    gradient[1] = -2.0 * L[PX];
-    break;
-  }
-}
-
-// E_c = L[-g], local axes.
-Eigen::Vector3d
-centreGradient(const UnboundedSurface& surface, const double L[])
-{
-  using namespace kernel;
-  const Eigen::Vector3d& k = surface.k;
-  const double up = 2.0 * L[P1];
-  switch (surface.model) {
-  case Model::Paraboloid:
-    return {-2.0 * (k[0] * L[PX] + k[1] * L[PY]),
-            -2.0 * (k[1] * L[PX] + k[2] * L[PY]),
-            up};
-  case Model::Sphere:
-    return {-2.0 * k[0] * L[PX], -2.0 * k[0] * L[PY], up - 2.0 * k[0] * L[PZ]};
-  case Model::Cylinder:
-    return {0.0, -2.0 * k[0] * L[PY], up - 2.0 * k[0] * L[PZ]};
-  case Model::Plane:
-    break;
-  }
-  return {0.0, 0.0, up};
-}
-
 // L[f_ab] for the shape parameters, upper triangle.
 void
 addCurvatureTerms(const UnboundedSurface& surface, const double L[], ThetaMatrix& H)
@@ -123,18 +72,13 @@ translationDirections(const UnboundedSurface& surface, const Eigen::Vector3d& li
   return directions;
 }
 
+// E_theta, zero on padding.
 Theta
-fullGradient(const UnboundedSurface& surface, const Scatter& scatter, const double L[])
+gradientOf(Model model, const double gradient[])
 {
-  Theta gradient = Theta::Zero();
-  shapeGradient(surface, L, gradient);
-  const int shape = kernel::shapeParameterCount(surface.model);
-  const int n = kernel::parameterCount(surface.model) - shape;
-  const Eigen::Vector3d E_c = centreGradient(surface, L);
-  const Eigen::Matrix3d directions = translationDirections(surface, scatter.normal());
-  for (int i = 0; i < n; ++i)
-    gradient[shape + i] = E_c.dot(directions.col(i));
-  return gradient;
+  Theta result = Theta::Zero();
+  std::copy_n(gradient, kernel::parameterCount(model), result.data());
+  return result;
 }
 
 // The weighted least-squares problem of one surface, as levenbergMarquardt() wants it.
@@ -160,7 +104,7 @@ struct SurfaceProblem {
                              kernelState(state, scatter),
                              sums);
     evaluation.cost = sums.cost;
-    evaluation.gradient = fullGradient(state, scatter, sums.L);
+    evaluation.gradient = gradientOf(model, sums.gradient);
     evaluation.JtJ.setIdentity();
     const int n = kernel::parameterCount(model);
     for (int a = 0, entry = 0; a < n; ++a)
@@ -192,21 +136,36 @@ unitScale(const ThetaMatrix& H, Model model)
   return scale;
 }
 
-// Scales to unit diagonal and returns the smallest Cholesky pivot; 0 when not positive.
-double
-smallestPivot(const ThetaMatrix& H, Model model)
-{
-  const Theta diagonal = H.diagonal();
-  if (!(diagonal.minCoeff() > 0.0) || !diagonal.allFinite())
-    return 0.0;
-  const Theta scale = unitScale(H, model);
-  const ThetaMatrix scaled = scale.asDiagonal() * H * scale.asDiagonal();
-  const Eigen::LLT<ThetaMatrix> cholesky(scaled);
-  if (cholesky.info() != Eigen::Success)
-    return 0.0;
-  const double smallest = cholesky.matrixLLT().diagonal().minCoeff();
-  return smallest * smallest;
-}
+// Cholesky factors of normal equations scaled to unit diagonal.
+class ScaledCholesky {
+public:
+  ScaledCholesky(const ThetaMatrix& H, Model model) : scale_(unitScale(H, model))
+  {
+    const bool positive = H.diagonal().minCoeff() > 0.0 && H.diagonal().allFinite();
+    if (!positive)
+      return;
+    cholesky_.compute(scale_.asDiagonal() * H * scale_.asDiagonal());
+    if (cholesky_.info() == Eigen::Success)
+      smallest_pivot_ = cholesky_.matrixLLT().diagonal().cwiseAbs2().minCoeff();
+  }
+
+  // 0 when the matrix is not positive definite: then there is nothing to solve.
+  double smallestPivot() const
+  {
+    return smallest_pivot_;
+  }
+
+  Theta solve(const Theta& b) const
+  {
+    const Theta scaled = scale_.cwiseProduct(b);
+    return scale_.cwiseProduct(Theta(cholesky_.solve(scaled)));
+  }
+
+private:
+  Theta scale_;
+  Eigen::LLT<ThetaMatrix> cholesky_;
+  double smallest_pivot_ = 0.0;
+};
 
 // Undetermined directions: eigenvectors of the scaled normal equations, of which there
 // is at least one where the smallest pivot is too small.
@@ -261,6 +220,16 @@ hessian(const UnboundedSurface& surface,
   return H;
 }
 
+// E_c = L[-g] of a paraboloid, local axes.
+Eigen::Vector3d
+centreGradient(const Eigen::Vector3d& k, const double L[])
+{
+  using namespace kernel;
+  return {-2.0 * (k[0] * L[PX] + k[1] * L[PY]),
+          -2.0 * (k[1] * L[PX] + k[2] * L[PY]),
+          2.0 * L[P1]};
+}
+
 // A = d^2E/dtheta ds. Only the paraboloid depends on the moments: c = mean + a n(C).
 ThetaByMoments
 momentCross(const UnboundedSurface& surface,
@@ -275,7 +244,7 @@ momentCross(const UnboundedSurface& surface,
   const auto T = crossSumMatrix(sums, kernel::kMaxTheta);
   A.leftCols<3>() = -T;
   A.rightCols<6>() = (-surface.a * T).lazyProduct(dn);
-  A.row(5).tail<6>() += centreGradient(surface, sums.L).transpose() * dn;
+  A.row(5).tail<6>() += centreGradient(surface.k, sums.L).transpose() * dn;
   return A;
 }
 
@@ -307,13 +276,13 @@ momentCovariance(const kernel::CovarianceSums& sums, int count)
   return DD;
 }
 
-Linearization
+void
 linearize(const UnboundedSurface& surface,
           const Scatter& scatter,
-          const kernel::CovarianceSums& sums)
+          const kernel::CovarianceSums& sums,
+          Linearization& result)
 {
   const int n = kernel::parameterCount(surface.model);
-  Linearization result;
   result.H = hessian(surface, sums, translationDirections(surface, scatter.normal()));
   result.A = momentCross(surface, scatter, sums);
   const double inverse_count = 1.0 / scatter.count;
@@ -326,7 +295,6 @@ linearize(const UnboundedSurface& surface,
       result.XD(a, 3 + e) = sums.XSq[a][e] * inverse_count;
   }
   result.DD = momentCovariance(sums, scatter.count);
-  return result;
 }
 
 FitStatus
@@ -365,7 +333,7 @@ polish(const SurfaceProblem& problem,
                                  problem.points,
                                  kernelState(fit.surface, problem.scatter),
                                  sums);
-    fit.linearization = linearize(fit.surface, problem.scatter, sums);
+    linearize(fit.surface, problem.scatter, sums, fit.linearization);
     fit.cost = sums.cost;
     if (!fit.linearization.H.allFinite()) {
       fit.status = FitStatus::NonFinite;
@@ -373,14 +341,13 @@ polish(const SurfaceProblem& problem,
     }
     if (sums.cost > start_cost + kClimb)
       break;
-    const Eigen::LLT<ThetaMatrix> cholesky(fit.linearization.H);
-    if (cholesky.info() != Eigen::Success ||
-        smallestPivot(fit.linearization.H, problem.model) < kSmallestPivot) {
+    const ScaledCholesky cholesky(fit.linearization.H, problem.model);
+    if (cholesky.smallestPivot() < kSmallestPivot) {
       fit.status = FitStatus::Degenerate;
       null_space = nullSpaceOf(fit.linearization.H, problem.model);
       return;
     }
-    const Theta gradient = fullGradient(fit.surface, problem.scatter, sums.L);
+    const Theta gradient = gradientOf(problem.model, sums.gradient);
     const Theta step = -cholesky.solve(gradient);
     fit.surface = retractedSurface(fit.surface, problem.scatter, step);
     if (std::sqrt(std::max(0.0, -step.dot(gradient))) <
@@ -413,7 +380,9 @@ setAxes(const Eigen::Vector3d& towards, Scatter& scatter)
 int
 approach(SurfaceProblem problem, const FitOptions& options, UnboundedSurface& surface)
 {
-  constexpr double kNear = 0.3; // sigmas
+  // Gauss-Newton leaves a hundredth of a step: one this long, in sigmas, needs no
+  // check.
+  constexpr double kNear = 2.0;
   problem.residual = Residual::Sampson;
   SurfaceProblem::Evaluation evaluation;
   return levenbergMarquardt(problem,
@@ -441,7 +410,7 @@ descend(const SurfaceProblem& problem,
   if (!evaluation.JtJ.allFinite())
     fit.status = FitStatus::NonFinite;
   if (fit.status != FitStatus::NonFinite &&
-      smallestPivot(evaluation.JtJ, problem.model) < kSmallestPivot) {
+      ScaledCholesky(evaluation.JtJ, problem.model).smallestPivot() < kSmallestPivot) {
     fit.status = FitStatus::Degenerate;
     null_space = nullSpaceOf(evaluation.JtJ, problem.model);
   }
@@ -630,13 +599,32 @@ fitSurface(kernel::Model model,
 }
 
 ThetaMatrix
+symmetricInverse(const ThetaMatrix& H)
+{
+  // Eigen solves for all columns of so small a matrix at several times this cost.
+  const Eigen::LLT<ThetaMatrix> cholesky(H);
+  const ThetaMatrix& L = cholesky.matrixLLT();
+  ThetaMatrix inverse = ThetaMatrix::Zero(); // of L
+  for (int j = 0; j < kernel::kMaxTheta; ++j) {
+    inverse(j, j) = 1.0 / L(j, j);
+    for (int i = j + 1; i < kernel::kMaxTheta; ++i) {
+      double sum = 0.0;
+      for (int k = j; k < i; ++k)
+        sum += L(i, k) * inverse(k, j);
+      inverse(i, j) = -sum / L(i, i);
+    }
+  }
+  return inverse.transpose().lazyProduct(inverse);
+}
+
+ThetaMatrix
 thetaCovariance(const Linearization& l, const ThetaMatrix& hessian)
 {
   // lazyProduct: for matrices this small Eigen's blocked product costs more than the
   // work.
   const ThetaByMoments half = l.XD + 0.5 * l.A.lazyProduct(l.DD);
   const ThetaMatrix cross = half.lazyProduct(l.A.transpose());
-  const ThetaMatrix inverse = hessian.llt().solve(ThetaMatrix(ThetaMatrix::Identity()));
+  const ThetaMatrix inverse = symmetricInverse(hessian);
   return inverse.lazyProduct(
       ThetaMatrix((l.XX + cross + cross.transpose()).lazyProduct(inverse)));
 }

@@ -116,7 +116,7 @@ enum Polynomial { P1, PX, PY, PZ, PXX, PYY, PZZ, PXY, PXZ, PYZ, kPolynomials };
 /// One damped Gauss-Newton iteration's sums.
 struct NormalSums {
   double cost;
-  double L[kPolynomials];
+  double gradient[kMaxTheta]; ///< E_theta = L[f_theta]
   double JtJ[21]; ///< packed upper triangle of size parameterCount
 };
 
@@ -124,6 +124,7 @@ struct NormalSums {
 /// symmetric index pairs in the order xx xy xz yy yz zz; qt = q - centroid.
 struct CovarianceSums {
   double cost;
+  double gradient[kMaxTheta];
   double L[kPolynomials];
   double H[15]; ///< packed, shape parameters; without the L[f_ab] part
   double X[kMaxTheta][3]; ///< sum X_i
@@ -135,6 +136,10 @@ struct CovarianceSums {
   double qS[3][6]; ///< sum qt_a (Sigma_i)_bc
   double qqS[6][6]; ///< sum qt_a qt_b (Sigma_i)_cd
 };
+
+/// How many points from the first on are surely valid: finite coordinates and a
+/// positive definite covariance. The next ones need a closer look.
+int countLeadingValid(const Points& points);
 
 void accumulateScatter(const Points& points, ScatterSums& sums);
 
@@ -180,6 +185,7 @@ const char* instructionSet();
 /// The reference code (number type double), whatever the machine offers: what tests and
 /// benchmarks compare the SIMD code with.
 namespace reference {
+int countLeadingValid(const Points& points);
 void accumulateScatter(const Points& points, ScatterSums& sums);
 void accumulateQuadric(const Points& points,
                        const double R[9],

@@ -56,7 +56,9 @@ struct FitOptions {
 
   int max_iterations = 30;
   /// The iterations stop when the remaining Newton step is below this many sigmas.
-  double step_tolerance_sigma = 1e-4;
+  /// Gauss-Newton leaves a thirtieth of it at most, save where the surface misfits: the
+  /// first exact Newton step is then within the tolerance of the last.
+  double step_tolerance_sigma = 3e-5;
   /// The final exact Newton step is repeated while it is longer than this, in sigmas.
   /// The covariance is taken before the last step, and is right to about this (patches
   /// that fill a small part of the view) to twenty times this (noise that bends with

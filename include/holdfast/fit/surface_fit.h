@@ -103,6 +103,9 @@ SurfaceFit fitSurface(kernel::Model model,
                       const FitOptions& options,
                       NullSpace& null_space);
 
+/// Inverse of a positive definite matrix.
+ThetaMatrix symmetricInverse(const ThetaMatrix& H);
+
 /// First-order covariance of theta, from the Hessian or its Gauss-Newton part.
 ThetaMatrix thetaCovariance(const Linearization& linearization,
                             const ThetaMatrix& hessian);
