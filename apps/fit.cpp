@@ -6,6 +6,7 @@
 #include <holdfast/io/atomic_file.h>
 #include <holdfast/io/patch_io.h>
 #include <holdfast/pcl/intrinsics.h>
+#include <holdfast/pcl/patch_estimation.h>
 
 #include <CLI/CLI.hpp>
 
@@ -26,7 +27,7 @@ constexpr const char* kExamples = R"(Examples:
   holdfast fit scene.pcd
       patches all over the cloud, as a table
   holdfast fit clouds/ -o results --radius 0.04 --spacing 0.02
-      every cloud of a folder; NAME.patches.json and NAME.patches.ply for each
+      every cloud of a folder; NAME.patches.json, .pcd and .ply for each
   holdfast fit depth.png --depth-scale 5000 --sensor kinect_v1 --json - > patches.json
       a depth image in units of 0.2 mm
   holdfast fit can.pcd --whole --surface cylinder --json -
@@ -88,7 +89,7 @@ private:
       throw std::runtime_error(existing.string() + ": cannot be written to");
   }
 
-  /// Both files or none.
+  /// All files or none.
   void writeFiles(const PatchReport& report)
   {
     const std::string stem = fs::path(report.cloud).stem().string();
@@ -103,9 +104,12 @@ private:
                                ": cannot be created: " + error.message());
     const fs::path base = fs::path(settings_.output_folder) / stem;
     AtomicFile json(base.string() + ".patches.json");
+    AtomicFile points(base.string() + ".patches.pcd");
     AtomicFile mesh(base.string() + ".patches.ply");
     writeJson(json.stream(), report, JsonLayout::PatchPerLine);
+    writePatchPoints(points.stream(), report.result.patches, report.sensor_pose);
     writeMesh(mesh.stream(), report.result.patches, false);
+    points.commit();
     mesh.commit();
     json.commit();
   }
@@ -138,7 +142,7 @@ checkPatches(const PatchReport& report)
 {
   if (!report.result.patches.empty())
     return;
-  const std::string rejected = rejectedText(report.result.rejected);
+  const std::string rejected = rejectedText(report.result);
   throw std::runtime_error(report.cloud +
                            ": no patch: " + (rejected.empty() ? "no seed" : rejected));
 }
@@ -160,6 +164,28 @@ neighborhoodNotices(const FitSettings& settings, const RangeCloud& cloud)
   return {"not organized: balls take the place of discs"};
 }
 
+/// Patches all over the cloud, by the class that PCL pipelines use.
+ExtractionResult
+estimatePatches(const RangeCloud& cloud,
+                const Sensor& sensor,
+                const ExtractionOptions& options)
+{
+  PatchEstimation<pcl::PointXYZ> estimation;
+  estimation.setInputCloud(cloud.points);
+  if (!cloud.covariances.empty())
+    estimation.setInputCovariances(
+        std::make_shared<const Covariances>(cloud.covariances));
+  estimation.setSensor(sensor);
+  estimation.setSensorPose(cloud.sensor_pose);
+  estimation.setOptions(options);
+  estimation.setSeedsFromSampler(true);
+  pcl::PointCloud<PatchPoint> points;
+  estimation.compute(points);
+  ExtractionResult result = sortOut(estimation.getResults());
+  result.notices = estimation.getNotices();
+  return result;
+}
+
 ExtractionResult
 extract(const RangeCloud& cloud, const Sensor& sensor, const FitSettings& settings)
 {
@@ -167,7 +193,7 @@ extract(const RangeCloud& cloud, const Sensor& sensor, const FitSettings& settin
   ExtractionOptions options = settings.extraction;
   options.progress = [&bar](int done, int total) { bar.update(done, total); };
   return settings.whole ? extractWhole(cloud, sensor, options) :
-                          extractPatches(cloud, sensor, options);
+                          estimatePatches(cloud, sensor, options);
 }
 
 /// The road from a file to its patches.

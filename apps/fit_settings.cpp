@@ -174,6 +174,42 @@ addPatchOptions(CLI::App& command, FitSettings& settings)
 }
 
 void
+addValidationOptions(CLI::App& command, ValidationOptions& limits)
+{
+  const std::string group = "Validation";
+  const auto add = [&](const std::string& name,
+                       std::optional<double>& limit,
+                       const CLI::Validator& valid,
+                       const std::string& description) {
+    command
+        .add_option_function<double>(
+            name,
+            [&limit](double value) { limit = value; },
+            description)
+        ->check(valid)
+        ->type_name("")
+        ->group(group);
+  };
+  add("--max-curvature",
+      limits.max_curvature_per_m,
+      positiveNumber("PER_M"),
+      "Turn down patches with a larger principal curvature, 1/metre");
+  add("--max-residual",
+      limits.max_residual_m,
+      positiveNumber("M"),
+      "Turn down patches with a larger rms distance of their points from the surface, "
+      "metres");
+  add("--min-coverage",
+      limits.min_coverage,
+      CLI::Range(0.0, 1.0, "SHARE"),
+      "Turn down patches of which points support a smaller share, 0 to 1");
+  add("--max-chi2",
+      limits.max_chi2_per_dof,
+      positiveNumber("RATIO"),
+      "Turn down patches with a larger chi-square per degree of freedom");
+}
+
+void
 addRunOptions(CLI::App& command, FitSettings& settings)
 {
   addChoice(command,
@@ -186,9 +222,11 @@ addRunOptions(CLI::App& command, FitSettings& settings)
       ->default_str("exact")
       ->group("Patches");
   command
-      .add_option("-o,--output",
-                  settings.output_folder,
-                  "Write NAME.patches.json and NAME.patches.ply (coloured mesh) here")
+      .add_option(
+          "-o,--output",
+          settings.output_folder,
+          "Write NAME.patches.json, NAME.patches.pcd (points with normals, parameters "
+          "and covariances) and NAME.patches.ply (coloured mesh) here")
       ->type_name("DIR")
       ->group("Output");
   command
@@ -229,6 +267,7 @@ addFitOptions(CLI::App& command, FitSettings& settings)
   addInputOptions(command, settings.input);
   addPatchOptions(command, settings);
   addNeighborhoodOptions(command, settings.extraction.sampler);
+  addValidationOptions(command, settings.extraction.validation.emplace());
   addRunOptions(command, settings);
   exclude(
       command,

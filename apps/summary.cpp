@@ -23,28 +23,6 @@ median(const Fits& fits, const Measure& measure)
   return *middle;
 }
 
-double
-chi2PerDof(const FitResult& fit)
-{
-  return fit.chi2_dof > 0 ? fit.chi2 / fit.chi2_dof : 0.0;
-}
-
-/// A turn by delta about the local x and y axes moves the normal by as much.
-double
-normalSigmaDegrees(const FitResult& fit)
-{
-  const ParameterMatrix tangent = toTangent(fit.patch, fit.covariance);
-  const int r = layoutOf(fit.patch.type).r();
-  return std::sqrt(tangent(r, r) + tangent(r + 1, r + 1)) * 180.0 / M_PI;
-}
-
-double
-centreSigmaMillimetres(const FitResult& fit)
-{
-  const int c = layoutOf(fit.patch.type).c();
-  return 1e3 * std::sqrt(fit.covariance.diagonal().segment(c, 3).sum());
-}
-
 /// The principal curvature of larger magnitude.
 double
 curvature(const FitResult& fit)
@@ -83,13 +61,40 @@ heading(const PatchReport& report)
 
 } // namespace
 
+double
+chi2PerDof(const FitResult& fit)
+{
+  return fit.chi2_dof > 0 ? fit.chi2 / fit.chi2_dof : 0.0;
+}
+
+/// A turn by delta about the local x and y axes moves the normal by as much.
+double
+normalSigmaDegrees(const FitResult& fit)
+{
+  const ParameterMatrix tangent = toTangent(fit.patch, fit.covariance);
+  const int r = layoutOf(fit.patch.type).r();
+  return std::sqrt(tangent(r, r) + tangent(r + 1, r + 1)) * 180.0 / M_PI;
+}
+
+double
+centreSigmaMillimetres(const FitResult& fit)
+{
+  const int c = layoutOf(fit.patch.type).c();
+  return 1e3 * std::sqrt(fit.covariance.diagonal().segment(c, 3).sum());
+}
+
 std::string
-rejectedText(const std::map<FitStatus, int>& rejected)
+rejectedText(const ExtractionResult& result)
 {
   std::string text;
-  for (const auto& [status, count] : rejected)
-    text += (text.empty() ? "" : ", ") + std::string(statusName(status)) + ' ' +
-            std::to_string(count);
+  const auto append = [&text](std::string_view reason, int count) {
+    text +=
+        (text.empty() ? "" : ", ") + std::string(reason) + ' ' + std::to_string(count);
+  };
+  for (const auto& [status, count] : result.rejected)
+    append(statusName(status), count);
+  for (const auto& [verdict, count] : result.turned_down)
+    append(verdictName(verdict), count);
   return text;
 }
 
@@ -108,7 +113,7 @@ summaryTable(const PatchReport& report)
                                               "curvature 1/m"}};
   for (const auto& [surface, fits] : by_surface)
     rows.push_back(tableRow(surface, fits));
-  const std::string rejected = rejectedText(report.result.rejected);
+  const std::string rejected = rejectedText(report.result);
   return heading(report) + formatTable(rows) +
          (rejected.empty() ? "" : "rejected: " + rejected + "\n");
 }

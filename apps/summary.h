@@ -1,4 +1,4 @@
-/// \file The result of a fit as a table for people.
+/// \file The result of a fit in numbers and a table for people.
 #pragma once
 
 #include <holdfast/io/patch_io.h>
@@ -7,12 +7,19 @@
 
 namespace holdfast {
 
-/// A heading, medians per surface type, and what was rejected. Sigma of the normal is
-/// the rms angle between the fitted and the noise-free normal, sigma of the centre the
-/// rms distance between the centres, both from the covariance.
+/// Rms angle between the fitted and the noise-free normal, from the covariance.
+double normalSigmaDegrees(const FitResult& fit);
+
+/// Rms distance between the fitted and the noise-free centre, from the covariance.
+double centreSigmaMillimetres(const FitResult& fit);
+
+/// 0 where there is no degree of freedom.
+double chi2PerDof(const FitResult& fit);
+
+/// A heading, medians per surface type, and what was rejected.
 std::string summaryTable(const PatchReport& report);
 
-/// "too_few_points 12, degenerate 3".
-std::string rejectedText(const std::map<FitStatus, int>& rejected);
+/// "too_few_points 12, degenerate 3, coverage_too_low 8".
+std::string rejectedText(const ExtractionResult& result);
 
 } // namespace holdfast

@@ -16,11 +16,19 @@ if(HOLDFAST_WITH_HIGHWAY)
 endif()
 
 # Asking for more components (features, io, surface, segmentation) would pull in VTK
-# and Qt. The readers and writers of pcl_io need neither, so it is linked by name.
+# and Qt. What we use of pcl_io and pcl_segmentation needs neither, so they are linked by
+# name.
 set(HOLDFAST_PCL_COMPONENTS common kdtree search octree sample_consensus filters)
 find_package(PCL 1.12 REQUIRED COMPONENTS ${HOLDFAST_PCL_COMPONENTS})
 find_library(HOLDFAST_PCL_IO_LIBRARY pcl_io HINTS ${PCL_LIBRARY_DIRS} REQUIRED)
-mark_as_advanced(HOLDFAST_PCL_IO_LIBRARY)
+find_library(HOLDFAST_PCL_SEGMENTATION_LIBRARY pcl_segmentation
+  HINTS ${PCL_LIBRARY_DIRS} REQUIRED)
+mark_as_advanced(HOLDFAST_PCL_IO_LIBRARY HOLDFAST_PCL_SEGMENTATION_LIBRARY)
+
+# PCL's own estimates, which programs, tests and benchmarks compare ours with.
+find_library(HOLDFAST_PCL_FEATURES_LIBRARY pcl_features HINTS ${PCL_LIBRARY_DIRS}
+  REQUIRED)
+mark_as_advanced(HOLDFAST_PCL_FEATURES_LIBRARY)
 
 if(HOLDFAST_BUILD_APPS)
   find_package(CLI11 REQUIRED)

@@ -23,7 +23,8 @@ set(CMAKE_POSITION_INDEPENDENT_CODE ON)
 
 if(HOLDFAST_SANITIZE)
   list(JOIN HOLDFAST_SANITIZE "," sanitizers)
-  add_compile_options(-fsanitize=${sanitizers} -fno-omit-frame-pointer)
+  add_compile_options(
+    -fsanitize=${sanitizers} -fno-sanitize-recover=all -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${sanitizers})
 endif()
 

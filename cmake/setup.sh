@@ -43,16 +43,21 @@ install_packages() {
     apt-get install -y --no-install-recommends "${missing[@]}"
 }
 
-# build_in FOLDER [cmake options]: configures and builds.
+# build_in FOLDER [cmake options] [-- targets]: configures and builds.
 build_in() {
-  local folder=$1
+  local folder=$1 options targets=()
   shift
-  local options=(-S "$root" -B "$folder" "$@")
+  options=(-S "$root" -B "$folder")
+  while (($#)) && [[ $1 != -- ]]; do
+    options+=("$1")
+    shift
+  done
+  (($# > 1)) && targets=(--target "${@:2}")
   if [[ ! -e $folder/CMakeCache.txt ]]; then
     command -v ninja >/dev/null && options+=(-G Ninja)
     command -v ccache >/dev/null && options+=(
       -DCMAKE_C_COMPILER_LAUNCHER=ccache -DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
   fi
   cmake "${options[@]}"
-  cmake --build "$folder" --parallel "$(nproc)"
+  cmake --build "$folder" --parallel "$(nproc)" "${targets[@]}"
 }

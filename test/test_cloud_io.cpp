@@ -406,6 +406,7 @@ TEST(CloudIo, CloudFilesOfAFolder)
   EXPECT_TRUE(isCloudFile("a.PCD"));
   EXPECT_TRUE(isCloudFile("a.ply"));
   EXPECT_FALSE(isCloudFile("a.patches.ply"));
+  EXPECT_FALSE(isCloudFile("folder/a.patches.pcd"));
   EXPECT_FALSE(isCloudFile("a.txt"));
 }
 

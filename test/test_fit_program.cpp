@@ -74,7 +74,7 @@ TEST(FitProgram, WholeFindsTheBowl)
   EXPECT_GT(fit.patch.normal().dot(test::tiltedPose().c - fit.patch.c), 0.0);
 }
 
-TEST(FitProgram, FolderWritesJsonAndMeshOfEveryCloud)
+TEST(FitProgram, FolderWritesJsonPointsAndMeshOfEveryCloud)
 {
   const std::string folder = freshFolder("fit_folder");
   const std::string out = folder + "/out/deep";
@@ -86,12 +86,20 @@ TEST(FitProgram, FolderWritesJsonAndMeshOfEveryCloud)
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_EQ(test::filesIn(out),
             (std::vector<std::string>{"a.patches.json",
+                                      "a.patches.pcd",
                                       "a.patches.ply",
                                       "b.patches.json",
+                                      "b.patches.pcd",
                                       "b.patches.ply"}));
   const PatchReport report = readJson(test::readFile(out + "/a.patches.json"));
   EXPECT_GT(report.result.patches.size(), 10U);
   EXPECT_EQ(test::readFile(out + "/a.patches.ply").substr(0, 4), "ply\n");
+  // The points lie where the centres are.
+  const RangeCloud points = loadCloud(out + "/a.patches.pcd");
+  ASSERT_EQ(points.points->size(), report.result.patches.size());
+  for (std::size_t i = 0; i < points.points->size(); ++i)
+    EXPECT_EQ((*points.points)[i].getVector3fMap(),
+              report.result.patches[i].fit.patch.c.cast<float>());
   EXPECT_LT(run.out.find("a.pcd: "), run.out.find("b.pcd: ")); // sorted, in the table
 }
 
@@ -111,6 +119,41 @@ TEST(FitProgram, OneJsonObjectPerLineForSeveralClouds)
   to_file.push_back(folder + "/patches.json");
   EXPECT_EQ(runProgram(folder, to_file).exit_code, 0);
   EXPECT_EQ(jsonLines(test::readFile(folder + "/patches.json")).size(), 2U);
+}
+
+TEST(FitProgram, ValidationTurnsPatchesDownAndCountsThem)
+{
+  const std::string folder = freshFolder("fit_validation");
+  const std::string cloud = saveBowl(folder, "bowl.pcd");
+  const auto fit = [&](const std::vector<std::string>& limits) {
+    std::vector<std::string> arguments{"fit", cloud, "--json", "-"};
+    arguments.insert(arguments.end(), limits.begin(), limits.end());
+    const auto run = runProgram(folder, arguments);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return readJson(run.out).result;
+  };
+  const ExtractionResult all = fit({});
+  EXPECT_TRUE(all.turned_down.empty());
+  std::vector<double> residual;
+  for (const ExtractedPatch& patch : all.patches) {
+    ASSERT_TRUE(patch.validation);
+    residual.push_back(patch.validation->residual.rms_m);
+  }
+  // In the middle of what was measured.
+  std::sort(residual.begin(), residual.end());
+  const double limit = residual[residual.size() / 2];
+  const ExtractionResult some = fit({"--max-residual", std::to_string(limit)});
+  const auto down = some.turned_down.find(PatchVerdict::ResidualTooLarge);
+  ASSERT_NE(down, some.turned_down.end());
+  EXPECT_EQ(some.patches.size() + static_cast<std::size_t>(down->second),
+            all.patches.size());
+  for (const ExtractedPatch& patch : some.patches)
+    EXPECT_LE(patch.validation->residual.rms_m, limit + 1e-6); // 6 decimals
+
+  const auto none = runProgram(folder, {"fit", cloud, "--max-residual", "1e-9"});
+  EXPECT_EQ(none.exit_code, 1);
+  EXPECT_NE(none.err.find("residual_too_large"), std::string::npos);
+  EXPECT_EQ(runProgram(folder, {"fit", cloud, "--min-coverage", "1.5"}).exit_code, 2);
 }
 
 TEST(FitProgram, TableAndQuiet)

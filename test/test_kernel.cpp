@@ -279,6 +279,27 @@ TEST_P(Kernel, CostIsHalfTheSquaredResiduals)
   }
 }
 
+TEST_P(Kernel, SquaredResidualsAreTwiceTheCostOfEveryPoint)
+{
+  for (std::uint64_t i = 0; i < kCases; ++i) {
+    Random random(i);
+    const Problem p = problem(random);
+    const Points all = p.kernelView();
+    std::vector<double> fast(static_cast<std::size_t>(all.padded_size));
+    std::vector<double> plain(fast.size());
+    squaredResiduals(p.model, p.residual, all, p.state(), fast.data());
+    reference::squaredResiduals(p.model, p.residual, all, p.state(), plain.data());
+    double sum = 0.0;
+    for (std::size_t k = 0; k < fast.size(); ++k) {
+      expectClose(fast[k], plain[k], 1.0 + plain[k], "fast");
+      EXPECT_TRUE(k < p.points.size() || fast[k] == 0.0);
+      sum += plain[k];
+    }
+    const Real cost = p.cost(p.quadric());
+    expectClose(0.5 * sum, cost, cost, "sum");
+  }
+}
+
 // L[p] is the derivative of the cost as f grows by epsilon p.
 TEST_P(Kernel, LIsTheDerivativeOfTheCostAlongAPolynomial)
 {

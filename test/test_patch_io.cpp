@@ -46,6 +46,7 @@ someReport()
   report.load_ms = 1.0 / 3.0;
   report.fit_ms = 2.0;
   report.result.rejected = {{FitStatus::TooFewPoints, 3}, {FitStatus::Degenerate, 1}};
+  report.result.turned_down = {{PatchVerdict::CoverageTooLow, 2}};
   for (const PatchType type : kPatchTypes) {
     ExtractedPatch extracted;
     FitResult& fit = extracted.fit;
@@ -63,6 +64,11 @@ someReport()
     extracted.seed_index = 17;
     extracted.seed = Eigen::Vector3d(0.1, 0.2, 1.0 / 3.0);
     extracted.radius_m = 0.05;
+    Validation& validation = extracted.validation.emplace();
+    validation.verdict = PatchVerdict::Accepted;
+    validation.residual.rms_m = random.uniform(0.0, 0.01);
+    validation.residual.largest_m = random.uniform(0.01, 0.02);
+    validation.coverage.share = random.uniform(0.0, 1.0);
     report.result.patches.push_back(extracted);
   }
   return report;
@@ -83,6 +89,7 @@ TEST(PatchIo, JsonComesBackBitForBit)
     const PatchReport read = readJson(jsonText(report, layout));
     EXPECT_EQ(read.cloud, report.cloud);
     EXPECT_EQ(read.result.rejected, report.result.rejected);
+    EXPECT_EQ(read.result.turned_down, report.result.turned_down);
     ASSERT_EQ(read.result.patches.size(), report.result.patches.size());
     for (std::size_t i = 0; i < read.result.patches.size(); ++i) {
       const ExtractedPatch& a = report.result.patches[i];
@@ -96,6 +103,11 @@ TEST(PatchIo, JsonComesBackBitForBit)
       EXPECT_EQ(a.seed_index, b.seed_index);
       EXPECT_EQ(a.seed, b.seed);
       EXPECT_EQ(a.radius_m, b.radius_m);
+      ASSERT_TRUE(b.validation);
+      EXPECT_EQ(b.validation->verdict, PatchVerdict::Accepted);
+      EXPECT_EQ(a.validation->residual.rms_m, b.validation->residual.rms_m);
+      EXPECT_EQ(a.validation->residual.largest_m, b.validation->residual.largest_m);
+      EXPECT_EQ(a.validation->coverage.share, b.validation->coverage.share);
     }
   }
 }
@@ -116,6 +128,7 @@ TEST(PatchIo, JsonHasTheDocumentedMembers)
                                       "rejected",
                                       "timing"}));
   EXPECT_EQ(json["rejected"]["too_few_points"], 3);
+  EXPECT_EQ(json["rejected"]["coverage_too_low"], 2);
   EXPECT_EQ(json["timing"]["patches_per_second"], 5000.0); // 10 patches in 2 ms
   members.clear();
   const auto& patch = json["patches"][0];
@@ -134,6 +147,8 @@ TEST(PatchIo, JsonHasTheDocumentedMembers)
                                       "chi2",
                                       "chi2_dof",
                                       "iterations",
+                                      "residual",
+                                      "coverage",
                                       "seed",
                                       "radius"}));
   EXPECT_EQ(patch["surface"], "elliptic_paraboloid");
@@ -158,10 +173,15 @@ TEST(PatchIo, WholeFitsHaveNoSeedAndInfinityIsNull)
   PatchReport report = someReport();
   report.whole = true;
   report.result.patches[0].seed_index.reset();
+  report.result.patches[0].radius_m = 0.0;
+  report.result.patches[0].validation.reset();
   report.result.patches[0].fit.chi2 = std::numeric_limits<double>::infinity();
   report.result.patches[0].fit.covariance(1, 1) = std::nan("");
   const auto json = nlohmann::json::parse(jsonText(report, JsonLayout::OneLine));
   EXPECT_TRUE(json["patches"][0]["seed"].is_null());
+  EXPECT_TRUE(json["patches"][0]["radius"].is_null());
+  EXPECT_TRUE(json["patches"][0]["residual"].is_null());
+  EXPECT_TRUE(json["patches"][0]["coverage"].is_null());
   EXPECT_TRUE(json["patches"][0]["chi2"].is_null());
   EXPECT_TRUE(json["patches"][0]["covariance"][1][1].is_null());
   EXPECT_TRUE(json["options"]["sampler"].is_null());
@@ -226,6 +246,29 @@ TEST(PatchIo, MeshIsWhatItsHeaderSays)
   }
   std::string more;
   EXPECT_FALSE(rows >> more);
+}
+
+TEST(PatchIo, MeshIsDarkerWhereFewPointsSupportAPatch)
+{
+  PatchReport report = someReport();
+  ExtractedPatch plane = report.result.patches[4];
+  ASSERT_EQ(plane.fit.patch.type.surface, SurfaceType::Plane);
+  const auto firstColor = [&plane] {
+    std::ostringstream text;
+    writeMesh(text, {plane}, true);
+    std::istringstream rows(text.str().substr(text.str().find("end_header") + 10));
+    double x, y, z;
+    int red;
+    rows >> x >> y >> z >> red;
+    return red;
+  };
+  const int full = surfaceColor(SurfaceType::Plane)[0];
+  plane.validation->coverage.share = 0.0;
+  EXPECT_EQ(firstColor(), full / 2);
+  plane.validation->coverage.share = 1.0;
+  EXPECT_EQ(firstColor(), full);
+  plane.validation.reset(); // not measured
+  EXPECT_EQ(firstColor(), full);
 }
 
 TEST(PatchIo, SurfaceColorsDiffer)

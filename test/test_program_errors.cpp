@@ -158,7 +158,9 @@ TEST_F(ProgramErrors, ABadFileDoesNotStopTheOthers)
   const std::string out = folder_ + "/out";
   expectError(1, {folder_, "-o", out, "--quiet"}, "bad.pcd: ");
   EXPECT_EQ(test::filesIn(out),
-            (std::vector<std::string>{"good.patches.json", "good.patches.ply"}));
+            (std::vector<std::string>{"good.patches.json",
+                                      "good.patches.pcd",
+                                      "good.patches.ply"}));
 }
 
 TEST_F(ProgramErrors, ResultsNeverReplaceThoseOfAnotherCloud)
@@ -177,7 +179,7 @@ TEST_F(ProgramErrors, BadCovariancesAreCountedAndLeftOut)
   });
   const std::string out = folder_ + "/out";
   expectError(1, {some, "-o", out, "--quiet", "--whole"}, "3 of 1199 covariances");
-  ASSERT_EQ(test::filesIn(out).size(), 2U);
+  ASSERT_EQ(test::filesIn(out).size(), 3U);
   const auto json = nlohmann::json::parse(test::readFile(out + "/some.patches.json"));
   EXPECT_EQ(json["patches"][0]["points"], 1199 - 3);
 

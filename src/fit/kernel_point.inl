@@ -1001,6 +1001,21 @@ moveOnto(const Points& points,
   }
 }
 
+// Twice every point's share of the cost.
+template <typename Surface, typename ResidualPolicy>
+void
+residualsOfPoints(const Points& points, const State& state, double* out)
+{
+  const Surface surface{state};
+  for (int i = 0; i < points.padded_size; i += kLanes) {
+    Local<BatchNoise> local;
+    enterFrame<ResidualPolicy>(surface, points, i, local);
+    const ResidualPolicy residual(local.f, local.V, local.w, local.weight);
+    const Number e = residual.first().e;
+    store(e * e * residual.inverse, out + i);
+  }
+}
+
 // ---- Choice of surface and residual -----------------------------------------------
 
 // Calls action.run<Surface, ResidualPolicy>() for the surface and residual named.
@@ -1055,6 +1070,18 @@ struct CovarianceAction {
   }
 };
 
+struct ResidualAction {
+  const Points& points;
+  const State& state;
+  double* out;
+
+  template <typename Surface, typename ResidualPolicy>
+  void run() const
+  {
+    residualsOfPoints<Surface, ResidualPolicy>(points, state, out);
+  }
+};
+
 inline void
 normalSums(Model model,
            Residual residual,
@@ -1073,4 +1100,14 @@ covarianceSums(Model model,
                CovarianceSums& sums)
 {
   forSurfaceAndResidual(model, residual, CovarianceAction{points, state, sums});
+}
+
+inline void
+residualsOfPoints(Model model,
+                  Residual residual,
+                  const Points& points,
+                  const State& state,
+                  double* out)
+{
+  forSurfaceAndResidual(model, residual, ResidualAction{points, state, out});
 }

@@ -132,5 +132,15 @@ moveOntoQuadric(const Points& points,
   moveOnto(points, R, c, h, viewpoint, out);
 }
 
+void
+squaredResiduals(Model model,
+                 Residual residual,
+                 const Points& points,
+                 const State& state,
+                 double* out)
+{
+  residualsOfPoints(model, residual, points, state, out);
+}
+
 } // namespace reference
 }} // namespace holdfast::kernel

@@ -66,7 +66,7 @@ load(const double* p)
 HWY_INLINE void
 store(Number x, double* p)
 {
-  hn::Store(x.v, kTag, p);
+  hn::StoreU(x.v, kTag, p);
 }
 
 HWY_INLINE double
@@ -154,6 +154,16 @@ dispatchedMove(const Points& points,
   moveOnto(points, R, c, h, viewpoint, out);
 }
 
+void
+dispatchedResiduals(Model model,
+                    Residual residual,
+                    const Points& points,
+                    const State& state,
+                    double* out)
+{
+  residualsOfPoints(model, residual, points, state, out);
+}
+
 }}} // namespace holdfast::kernel::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -167,6 +177,7 @@ HWY_EXPORT(dispatchedQuadric);
 HWY_EXPORT(dispatchedNormal);
 HWY_EXPORT(dispatchedCovariance);
 HWY_EXPORT(dispatchedMove);
+HWY_EXPORT(dispatchedResiduals);
 
 const char*
 instructionSet()
@@ -224,6 +235,16 @@ moveOntoQuadric(const Points& points,
                 double* const out[3])
 {
   HWY_DYNAMIC_DISPATCH(dispatchedMove)(points, R, c, h, viewpoint, out);
+}
+
+void
+squaredResiduals(Model model,
+                 Residual residual,
+                 const Points& points,
+                 const State& state,
+                 double* out)
+{
+  HWY_DYNAMIC_DISPATCH(dispatchedResiduals)(model, residual, points, state, out);
 }
 
 }} // namespace holdfast::kernel
@@ -289,6 +310,16 @@ moveOntoQuadric(const Points& points,
                 double* const out[3])
 {
   reference::moveOntoQuadric(points, R, c, h, viewpoint, out);
+}
+
+void
+squaredResiduals(Model model,
+                 Residual residual,
+                 const Points& points,
+                 const State& state,
+                 double* out)
+{
+  reference::squaredResiduals(model, residual, points, state, out);
 }
 
 }} // namespace holdfast::kernel

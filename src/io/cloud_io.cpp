@@ -297,10 +297,8 @@ saveCloud(const std::string& path, const RangeCloud& cloud, bool ascii)
 bool
 isCloudFile(const std::string& path)
 {
-  const std::string name = std::filesystem::path(path).filename().string();
-  constexpr std::string_view kMesh = ".patches.ply";
-  if (name.size() >= kMesh.size() &&
-      name.compare(name.size() - kMesh.size(), kMesh.size(), kMesh) == 0)
+  // NAME.patches.ply, NAME.patches.pcd
+  if (std::filesystem::path(path).stem().extension() == ".patches")
     return false;
   const Format format = formatOfExtension(path);
   if (format != Format::Png && format != Format::Pgm)

@@ -1,8 +1,12 @@
 #include <holdfast/io/patch_io.h>
 #include <holdfast/patch/tessellation.h>
+#include <holdfast/pcl/conversions.h>
 #include <holdfast/version.h>
 
 #include <nlohmann/json.hpp>
+
+#include <pcl/conversions.h>
+#include <pcl/io/pcd_io.h>
 
 #include <Eigen/Geometry>
 
@@ -91,6 +95,26 @@ samplerJson(const SamplerOptions& sampler)
   return json;
 }
 
+/// Null where there is no value.
+template <typename T>
+Json
+optionalJson(const std::optional<T>& value)
+{
+  return value ? Json(*value) : Json();
+}
+
+/// Null when patches were not even measured.
+Json
+validationJson(const std::optional<ValidationOptions>& validation)
+{
+  if (!validation)
+    return {};
+  return {{"max_curvature", optionalJson(validation->max_curvature_per_m)},
+          {"max_residual", optionalJson(validation->max_residual_m)},
+          {"min_coverage", optionalJson(validation->min_coverage)},
+          {"max_chi2_per_dof", optionalJson(validation->max_chi2_per_dof)}};
+}
+
 Json
 optionsJson(const PatchReport& report)
 {
@@ -109,7 +133,8 @@ optionsJson(const PatchReport& report)
           {"normal_from_pca", fit.normal_from_pca},
           {"smooth_circle_radius", fit.smooth_circle_radius},
           {"statistical_discrimination", fit.statistical_discrimination},
-          {"covariance", covarianceModeName(report.options.covariance)}};
+          {"covariance", covarianceModeName(report.options.covariance)},
+          {"validation", validationJson(report.options.validation)}};
 }
 
 Json
@@ -132,8 +157,15 @@ patchJson(const ExtractedPatch& extracted, CovarianceMode mode)
             {"chi2", fit.chi2},
             {"chi2_dof", fit.chi2_dof},
             {"iterations", fit.iterations},
+            {"residual", Json()},
+            {"coverage", Json()},
             {"seed", seed},
-            {"radius", extracted.seed_index ? Json(extracted.radius_m) : Json()}};
+            {"radius", extracted.radius_m > 0.0 ? Json(extracted.radius_m) : Json()}};
+  if (const auto& validation = extracted.validation) {
+    json["residual"] = {{"rms", validation->residual.rms_m},
+                        {"largest", validation->residual.largest_m}};
+    json["coverage"] = validation->coverage.share;
+  }
   if (mode == CovarianceMode::SecondOrder)
     json["mean_shift"] = vectorJson(fit.mean_shift);
   return json;
@@ -150,11 +182,13 @@ timingJson(const PatchReport& report)
 }
 
 Json
-rejectedJson(const std::map<FitStatus, int>& rejected)
+rejectedJson(const ExtractionResult& result)
 {
   Json json = Json::object();
-  for (const auto& [status, count] : rejected)
+  for (const auto& [status, count] : result.rejected)
     json[std::string(statusName(status))] = count;
+  for (const auto& [verdict, count] : result.turned_down)
+    json[std::string(verdictName(verdict))] = count;
   return json;
 }
 
@@ -165,13 +199,47 @@ text(const Json& json)
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-FitStatus
+/// The enumerator up to `last` that nameOf() calls so.
+template <typename Enum, typename NameOf>
+std::optional<Enum>
+fromName(const std::string& name, Enum last, const NameOf& nameOf)
+{
+  for (int i = 0; i <= static_cast<int>(last); ++i)
+    if (nameOf(static_cast<Enum>(i)) == name)
+      return static_cast<Enum>(i);
+  return std::nullopt;
+}
+
+std::optional<FitStatus>
 statusFromName(const std::string& name)
 {
-  for (int i = 0; i <= static_cast<int>(FitStatus::NonFinite); ++i)
-    if (statusName(static_cast<FitStatus>(i)) == name)
-      return static_cast<FitStatus>(i);
-  throw std::runtime_error("unknown status '" + name + "'");
+  return fromName(name, FitStatus::NonFinite, statusName);
+}
+
+std::optional<PatchVerdict>
+verdictFromName(const std::string& name)
+{
+  return fromName(name, PatchVerdict::ChiSquareTooLarge, verdictName);
+}
+
+template <typename Enum>
+Enum
+known(const std::optional<Enum>& value, const std::string& name)
+{
+  if (!value)
+    throw std::runtime_error("unknown status '" + name + "'");
+  return *value;
+}
+
+void
+readRejected(const Json& json, ExtractionResult& result)
+{
+  for (const auto& [name, count] : json.items()) {
+    if (const auto status = statusFromName(name))
+      result.rejected[*status] = count;
+    else
+      result.turned_down[known(verdictFromName(name), name)] = count;
+  }
 }
 
 double
@@ -218,7 +286,8 @@ patchFromJson(const Json& json)
   ExtractedPatch extracted;
   FitResult& fit = extracted.fit;
   readNumbers(json, fit);
-  fit.status = statusFromName(json.at("status"));
+  const std::string status = json.at("status");
+  fit.status = known(statusFromName(status), status);
   fit.points = json.at("points");
   fit.chi2 = number(json.at("chi2"));
   fit.chi2_dof = json.at("chi2_dof");
@@ -227,7 +296,15 @@ patchFromJson(const Json& json)
     extracted.seed_index = seed.at("index").get<int>();
     for (Eigen::Index i = 0; i < 3; ++i)
       extracted.seed(i) = number(seed.at("point").at(static_cast<std::size_t>(i)));
-    extracted.radius_m = number(json.at("radius"));
+  }
+  if (const Json& radius = json.at("radius"); !radius.is_null())
+    extracted.radius_m = radius;
+  if (const Json& residual = json.at("residual"); !residual.is_null()) {
+    Validation& validation = extracted.validation.emplace();
+    validation.verdict = PatchVerdict::Accepted;
+    validation.residual.rms_m = number(residual.at("rms"));
+    validation.residual.largest_m = number(residual.at("largest"));
+    validation.coverage.share = number(json.at("coverage"));
   }
   return extracted;
 }
@@ -238,6 +315,17 @@ struct ColoredMesh {
   std::vector<std::array<std::uint8_t, 3>> colors; ///< one per vertex
   std::vector<std::array<std::int32_t, 3>> triangles;
 };
+
+std::array<std::uint8_t, 3>
+shadedColor(const ExtractedPatch& extracted)
+{
+  std::array<std::uint8_t, 3> color = surfaceColor(extracted.fit.patch.type.surface);
+  if (extracted.validation)
+    for (std::uint8_t& channel : color)
+      channel = static_cast<std::uint8_t>(
+          0.5 * (1.0 + extracted.validation->coverage.share) * channel);
+  return color;
+}
 
 ColoredMesh
 meshOf(const std::vector<ExtractedPatch>& patches)
@@ -251,7 +339,7 @@ meshOf(const std::vector<ExtractedPatch>& patches)
     const auto first = static_cast<std::int32_t>(all.vertices.size());
     for (const Eigen::Vector3d& vertex : mesh.vertices)
       all.vertices.emplace_back(vertex.cast<float>());
-    all.colors.resize(all.vertices.size(), surfaceColor(patch.type.surface));
+    all.colors.resize(all.vertices.size(), shadedColor(extracted));
     for (const auto& t : mesh.triangles)
       all.triangles.push_back({first + t[0], first + t[1], first + t[2]});
   }
@@ -316,7 +404,7 @@ writeJson(std::ostream& out, const PatchReport& report, JsonLayout layout)
                        ",\n")
         << text(patchJson(report.result.patches[i], report.options.covariance));
   out << gap << "]," << gap;
-  member("rejected", rejectedJson(report.result.rejected));
+  member("rejected", rejectedJson(report.result));
   out << "\"timing\":" << text(timingJson(report)) << gap << "}\n";
 }
 
@@ -329,8 +417,7 @@ readJson(const std::string& text)
     report.cloud = json.at("cloud");
     for (const Json& patch : json.at("patches"))
       report.result.patches.push_back(patchFromJson(patch));
-    for (const auto& [name, count] : json.at("rejected").items())
-      report.result.rejected[statusFromName(name)] = count;
+    readRejected(json.at("rejected"), report.result);
     return report;
   }
   catch (const Json::exception& error) {
@@ -353,6 +440,22 @@ writeMesh(std::ostream& out, const std::vector<ExtractedPatch>& patches, bool as
     writeMeshText(out, mesh);
   else
     writeMeshBinary(out, mesh);
+}
+
+void
+writePatchPoints(std::ostream& out,
+                 const std::vector<ExtractedPatch>& patches,
+                 const Pose& sensor_pose)
+{
+  const pcl::PointCloud<PatchPoint> cloud = toPatchCloud(patches, sensor_pose);
+  pcl::PCLPointCloud2 fields;
+  pcl::toPCLPointCloud2(cloud, fields);
+  const int failed = pcl::PCDWriter().writeBinaryCompressed(out,
+                                                            fields,
+                                                            cloud.sensor_origin_,
+                                                            cloud.sensor_orientation_);
+  if (failed != 0)
+    out.setstate(std::ios::failbit);
 }
 
 std::array<std::uint8_t, 3>

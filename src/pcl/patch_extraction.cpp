@@ -67,33 +67,36 @@ isMostlyOutOfView(const RangeCloud& cloud, const Sensor& sensor)
   return 2 * static_cast<std::size_t>(out_of_view) > finite.size();
 }
 
-/// The sensor itself, or one with constant noise where its own means nothing.
+Sensor
+withConstantNoise(Sensor sensor)
+{
+  sensor.noise = std::make_shared<const ConstantNoiseModel>(
+      ConstantNoiseModel::Parameters{kUnknownSigma, kUnknownSigma});
+  return sensor;
+}
+
+/// The sensor itself, or one with constant noise where its own means nothing or, since
+/// the cloud brings its covariances, is not asked.
 Sensor
 applicableSensor(const RangeCloud& cloud,
                  const Sensor& sensor,
                  std::vector<std::string>& notices)
 {
+  requireValid(validityError(cloud));
+  const bool has_covariances = !cloud.covariances.empty();
+  requireValid(sensor.noise || has_covariances ?
+                   "" :
+                   "the cloud has no covariances, and the sensor no noise model");
+  if (!sensor.noise)
+    return withConstantNoise(sensor);
   const bool organized = cloud.points->height > 1;
-  if (!cloud.covariances.empty() || sensor.noise->isOmnidirectional() || organized ||
+  if (has_covariances || sensor.noise->isOmnidirectional() || organized ||
       !isMostlyOutOfView(cloud, sensor))
     return sensor;
   notices.push_back("most points lie where the sensor " + sensor.name +
                     " cannot see: a noise of 1 mm in every direction is assumed; "
                     "another sensor or a covariance field changes that");
-  Sensor applicable = sensor;
-  applicable.noise = std::make_shared<const ConstantNoiseModel>(
-      ConstantNoiseModel::Parameters{kUnknownSigma, kUnknownSigma});
-  return applicable;
-}
-
-Sensor
-checkedSensor(const RangeCloud& cloud,
-              const Sensor& sensor,
-              std::vector<std::string>& notices)
-{
-  requireValid(validityError(cloud));
-  requireValid(sensor.noise ? "" : "the sensor has no noise model");
-  return applicableSensor(cloud, sensor, notices);
+  return withConstantNoise(sensor);
 }
 
 FitOptions
@@ -160,36 +163,162 @@ parallelFor(int n, int threads, Work&& work)
     std::rethrow_exception(error);
 }
 
-/// What one thread keeps from patch to patch.
-struct Workspace {
-  explicit Workspace(const NeighborhoodSampler& sampler)
-  : scratch(sampler.makeScratch())
-  {}
+} // namespace
 
-  NeighborhoodSampler::ScratchPtr scratch;
-  std::vector<int> indices;
-  PointBatch batch;
+struct PatchExtractor::Impl {
+  Impl(const RangeCloud& the_cloud, const Sensor& nominal, const ExtractionOptions& o)
+  : cloud(the_cloud)
+  , sensor(applicableSensor(cloud, nominal, notices))
+  , radius_m(o.sampler.neighborhood == Neighborhood::Knn ? 0.0 : o.sampler.radius_m)
+  , validation(o.validation)
+  , progress(o.progress)
+  , threads(checkedThreads(o.threads))
+  , estimator(checkedFitOptions(cloud, o), o.covariance)
+  , gatherer(cloud, sensor.noise, o.fit.noise_at_surface)
+  {
+    requireValid(validation ? validityError(*validation) : "");
+  }
+
+  /// \param batch working memory
+  ExtractedPatch attempt(const std::vector<int>& indices,
+                         const Eigen::Vector3d& origin,
+                         PointBatch& batch) const;
+
+  const RangeCloud& cloud;
+  std::vector<std::string> notices;
+  Sensor sensor;
+  double radius_m;
+  std::optional<ValidationOptions> validation;
+  std::function<void(int, int)> progress;
+  int threads;
+  PatchEstimator estimator;
+  PointGatherer gatherer;
 };
 
-std::vector<Workspace>
-makeWorkspaces(const NeighborhoodSampler& sampler, int count)
+ExtractedPatch
+PatchExtractor::Impl::attempt(const std::vector<int>& indices,
+                              const Eigen::Vector3d& origin,
+                              PointBatch& batch) const
 {
-  std::vector<Workspace> workspaces;
-  for (int i = 0; i < count; ++i)
-    workspaces.emplace_back(sampler);
-  return workspaces;
+  ExtractedPatch patch;
+  gatherer.gather(indices, origin, batch);
+  patch.fit = estimator.estimate(batch);
+  if (validation)
+    patch.validation = validate(patch.fit, batch, *validation);
+  return patch;
 }
 
-/// Sorts fits into patches and rejects, in the order given.
-void
-collect(std::vector<ExtractedPatch>&& fits, ExtractionResult& result)
+PatchExtractor::PatchExtractor(const RangeCloud& cloud,
+                               const Sensor& sensor,
+                               const ExtractionOptions& options)
+: impl_(std::make_unique<const Impl>(cloud, sensor, options))
+{}
+
+PatchExtractor::~PatchExtractor() = default;
+
+std::vector<ExtractedPatch>
+PatchExtractor::fitAround(const std::vector<Seed>& seeds,
+                          const NeighborhoodSearch& search) const
 {
-  for (ExtractedPatch& patch : fits) {
-    if (isUsable(patch.fit.status))
+  struct Workspace {
+    std::vector<int> indices;
+    PointBatch batch;
+  };
+  const int n = static_cast<int>(seeds.size());
+  std::vector<Workspace> workspaces(static_cast<std::size_t>(impl_->threads));
+  std::vector<ExtractedPatch> attempts(seeds.size());
+  ProgressReport progress(impl_->progress, n);
+  parallelFor(n, impl_->threads, [&](int i, int thread) {
+    const Seed& seed = seeds[i];
+    Workspace& work = workspaces[thread];
+    search(seed, thread, work.indices);
+    attempts[i] = impl_->attempt(work.indices, seed.position, work.batch);
+    attempts[i].seed_index = seed.index;
+    attempts[i].seed = seed.position;
+    attempts[i].radius_m = impl_->radius_m;
+    progress.oneDone();
+  });
+  return attempts;
+}
+
+std::vector<ExtractedPatch>
+PatchExtractor::fitAround(const std::vector<int>& seeds,
+                          const NeighborhoodSampler& sampler) const
+{
+  std::vector<Seed> places;
+  places.reserve(seeds.size());
+  for (const int index : seeds)
+    places.push_back({index, position(impl_->cloud, index)});
+  std::vector<NeighborhoodSampler::ScratchPtr> scratch;
+  for (int thread = 0; thread < impl_->threads; ++thread)
+    scratch.push_back(sampler.makeScratch());
+  return fitAround(places,
+                   [&](const Seed& seed, int thread, std::vector<int>& indices) {
+                     sampler.neighborhood(seed.index, *scratch[thread], indices);
+                   });
+}
+
+ExtractedPatch
+PatchExtractor::fitWhole() const
+{
+  const std::vector<int> indices = finitePoints(impl_->cloud);
+  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < indices.size(); ++i)
+    centroid +=
+        (position(impl_->cloud, indices[i]) - centroid) / static_cast<double>(i + 1);
+  PointBatch batch;
+  return impl_->attempt(indices, centroid, batch);
+}
+
+const Sensor&
+PatchExtractor::sensor() const
+{
+  return impl_->sensor;
+}
+
+const std::vector<std::string>&
+PatchExtractor::notices() const
+{
+  return impl_->notices;
+}
+
+int
+PatchExtractor::countInvalidCovariances() const
+{
+  return impl_->gatherer.countInvalidCovariances();
+}
+
+bool
+isAccepted(const ExtractedPatch& patch)
+{
+  return isUsable(patch.fit.status) &&
+         (!patch.validation || patch.validation->verdict == PatchVerdict::Accepted);
+}
+
+ExtractionResult
+sortOut(std::vector<ExtractedPatch> attempts)
+{
+  ExtractionResult result;
+  for (ExtractedPatch& patch : attempts) {
+    if (isAccepted(patch))
       result.patches.push_back(std::move(patch));
+    else if (isUsable(patch.fit.status))
+      ++result.turned_down[patch.validation->verdict];
     else
       ++result.rejected[patch.fit.status];
   }
+  return result;
+}
+
+namespace {
+
+ExtractionResult
+resultOf(const PatchExtractor& extractor, std::vector<ExtractedPatch> attempts)
+{
+  ExtractionResult result = sortOut(std::move(attempts));
+  result.invalid_covariances = extractor.countInvalidCovariances();
+  result.notices = extractor.notices();
+  return result;
 }
 
 } // namespace
@@ -199,32 +328,9 @@ extractPatches(const RangeCloud& cloud,
                const Sensor& sensor,
                const ExtractionOptions& options)
 {
-  ExtractionResult result;
-  const Sensor applicable = checkedSensor(cloud, sensor, result.notices);
-  const PatchEstimator estimator(checkedFitOptions(cloud, options), options.covariance);
-  const NeighborhoodSampler sampler(cloud, applicable, options.sampler);
-  const PointGatherer gatherer(cloud, applicable.noise, options.fit.noise_at_surface);
-  result.invalid_covariances = gatherer.countInvalidCovariances();
-
-  const std::vector<int> seeds = sampler.seeds();
-  const int n = static_cast<int>(seeds.size());
-  const int threads = checkedThreads(options.threads);
-  std::vector<Workspace> workspaces = makeWorkspaces(sampler, threads);
-  std::vector<ExtractedPatch> fits(seeds.size());
-  ProgressReport progress(options.progress, n);
-  parallelFor(n, threads, [&](int i, int thread) {
-    Workspace& work = workspaces[thread];
-    const Eigen::Vector3d seed = position(cloud, seeds[i]);
-    sampler.neighborhood(seeds[i], *work.scratch, work.indices);
-    gatherer.gather(work.indices, seed, work.batch);
-    fits[i].fit = estimator.estimate(work.batch);
-    fits[i].seed_index = seeds[i];
-    fits[i].seed = seed;
-    fits[i].radius_m = options.sampler.radius_m;
-    progress.oneDone();
-  });
-  collect(std::move(fits), result);
-  return result;
+  const PatchExtractor extractor(cloud, sensor, options);
+  const NeighborhoodSampler sampler(cloud, extractor.sensor(), options.sampler);
+  return resultOf(extractor, extractor.fitAround(sampler.seeds(), sampler));
 }
 
 ExtractionResult
@@ -232,22 +338,8 @@ extractWhole(const RangeCloud& cloud,
              const Sensor& sensor,
              const ExtractionOptions& options)
 {
-  ExtractionResult result;
-  const Sensor applicable = checkedSensor(cloud, sensor, result.notices);
-  const PatchEstimator estimator(checkedFitOptions(cloud, options), options.covariance);
-  const PointGatherer gatherer(cloud, applicable.noise, options.fit.noise_at_surface);
-  result.invalid_covariances = gatherer.countInvalidCovariances();
-
-  const std::vector<int> indices = finitePoints(cloud);
-  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();
-  for (std::size_t i = 0; i < indices.size(); ++i)
-    centroid += (position(cloud, indices[i]) - centroid) / static_cast<double>(i + 1);
-  PointBatch batch;
-  gatherer.gather(indices, centroid, batch);
-  std::vector<ExtractedPatch> fits(1);
-  fits[0].fit = estimator.estimate(batch);
-  collect(std::move(fits), result);
-  return result;
+  const PatchExtractor extractor(cloud, sensor, options);
+  return resultOf(extractor, {extractor.fitWhole()});
 }
 
 } // namespace holdfast

@@ -1,8 +1,8 @@
-// Uses holdfast::pcl: patches of a small organized cloud seen by a simulated camera.
-// The cloud grows and shrinks through PCL's own allocator, here and inside the
-// libraries.
+// Uses holdfast::pcl: patches of a small organized cloud seen by a simulated camera, by
+// the engine and by the PCL class. The cloud grows and shrinks through PCL's own
+// allocator, here and inside the libraries.
 #include <holdfast/io/cloud_io.h>
-#include <holdfast/pcl/patch_extraction.h>
+#include <holdfast/pcl/patch_estimation.h>
 #include <holdfast/sensor/stereo_noise_model.h>
 
 #include <cmath>
@@ -44,6 +44,24 @@ seenBy(const holdfast::Camera& camera)
   return cloud;
 }
 
+/// How many patches the class finds, from seeds of its own.
+std::size_t
+estimatedPatches(const pcl::PointCloud<pcl::PointXYZ>::Ptr& cloud,
+                 const holdfast::Sensor& sensor)
+{
+  holdfast::PatchEstimation<pcl::PointXYZ> estimation;
+  estimation.setInputCloud(cloud);
+  estimation.setSensor(sensor);
+  estimation.setRadiusSearch(0.1);
+  estimation.setSeedsFromSampler(true);
+  pcl::PointCloud<holdfast::PatchPoint> patches;
+  estimation.compute(patches);
+  std::size_t found = 0;
+  for (const holdfast::PatchPoint& patch : patches)
+    found += std::isfinite(patch.x);
+  return found;
+}
+
 } // namespace
 
 int
@@ -52,7 +70,8 @@ main()
   const char* const path = "pcl_consumer.pcd";
   const holdfast::Sensor sensor = smallSensor();
   holdfast::RangeCloud cloud;
-  cloud.points = seenBy(sensor.camera);
+  const auto points = seenBy(sensor.camera);
+  cloud.points = points;
   holdfast::saveCloud(path, cloud);
   holdfast::RangeCloud loaded = holdfast::loadCloud(path);
 
@@ -63,8 +82,11 @@ main()
   options.sampler.neighborhood = holdfast::Neighborhood::Knn; // through PCL's k-d tree
   const auto nearest = holdfast::extractPatches(cloud, sensor, options);
 
-  std::printf("%zu patches from discs, %zu from nearest points\n",
+  const std::size_t estimated = estimatedPatches(points, sensor);
+
+  std::printf("%zu patches from discs, %zu from nearest points, %zu by the class\n",
               discs.patches.size(),
-              nearest.patches.size());
-  return discs.patches.empty() || nearest.patches.empty();
+              nearest.patches.size(),
+              estimated);
+  return discs.patches.empty() || nearest.patches.empty() || estimated == 0;
 }

@@ -72,12 +72,14 @@ shellQuoted(const std::string& word)
   return quoted + "'";
 }
 
-/// Runs `holdfast ARGUMENTS...`. \param folder where its standard error is kept
+/// Runs a program with arguments. \param folder where its standard error is kept
 inline ProgramRun
-runProgram(const std::string& folder, const std::vector<std::string>& arguments)
+runExecutable(const std::string& folder,
+              const std::string& executable,
+              const std::vector<std::string>& arguments)
 {
   const std::string errors = folder + "/stderr.txt";
-  std::string command = shellQuoted(HOLDFAST_PROGRAM);
+  std::string command = shellQuoted(executable);
   for (const std::string& argument : arguments)
     command += ' ' + shellQuoted(argument);
   command += " 2>" + shellQuoted(errors) + " </dev/null";
@@ -93,6 +95,22 @@ runProgram(const std::string& folder, const std::vector<std::string>& arguments)
   run.err = readFile(errors);
   std::filesystem::remove(errors);
   return run;
+}
+
+/// Runs `holdfast ARGUMENTS...`.
+inline ProgramRun
+runProgram(const std::string& folder, const std::vector<std::string>& arguments)
+{
+  return runExecutable(folder, HOLDFAST_PROGRAM, arguments);
+}
+
+/// Runs a program of samples/.
+inline ProgramRun
+runSample(const std::string& folder,
+          const std::string& name,
+          const std::vector<std::string>& arguments)
+{
+  return runExecutable(folder, HOLDFAST_SAMPLES "/" + name, arguments);
 }
 
 /// A recorded cloud, or an empty string when there are none on this machine.

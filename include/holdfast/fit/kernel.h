@@ -171,6 +171,15 @@ void accumulateCovariance(Model model,
                           const State& state,
                           CovarianceSums& sums);
 
+/// Squared residual of every point, padding included (zero there): twice its share of
+/// the cost. Of the state only R, c and k are used.
+/// \param out as many numbers as points.padded_size.
+void squaredResiduals(Model model,
+                      Residual residual,
+                      const Points& points,
+                      const State& state,
+                      double* out);
+
 /// X_i of every point (p x 3 row-major each, local frame), for stages that correlate
 /// two fits; always the reference code.
 void crossTerms(Model model,
@@ -207,6 +216,11 @@ void accumulateCovariance(Model model,
                           const Points& points,
                           const State& state,
                           CovarianceSums& sums);
+void squaredResiduals(Model model,
+                      Residual residual,
+                      const Points& points,
+                      const State& state,
+                      double* out);
 } // namespace reference
 
 }} // namespace holdfast::kernel

@@ -54,7 +54,7 @@ RangeCloud loadCloud(const std::string& path,
 void saveCloud(const std::string& path, const RangeCloud& cloud, bool ascii = false);
 
 /// True for a file that loadCloud() is meant for: by its extension, and for PNG images
-/// by 16 bits of gray. Our own meshes (NAME.patches.ply) are none.
+/// by 16 bits of gray. Our own results (NAME.patches.pcd and .ply) are none.
 bool isCloudFile(const std::string& path);
 
 /// How many points are finite.

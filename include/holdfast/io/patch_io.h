@@ -38,11 +38,18 @@ void writeJson(std::ostream& out, const PatchReport& report, JsonLayout layout);
 PatchReport readJson(const std::string& text);
 
 /// Writes the patches as one triangle mesh (PLY: vertices x y z in metres, red green
-/// blue by surface type, in the frame of the cloud), each with edges of about an eighth
-/// of its length.
+/// blue, in the frame of the cloud), each with edges of about an eighth of its length.
+/// Colours go by surface type, darker where points support less of a measured patch:
+/// full at a coverage of 1, half at 0.
 void writeMesh(std::ostream& out,
                const std::vector<ExtractedPatch>& patches,
                bool ascii);
+
+/// Writes the patches, one at least, as a compressed PCD of PatchPoint, which PCL and
+/// its tools read. Sets the fail bit when that does not work.
+void writePatchPoints(std::ostream& out,
+                      const std::vector<ExtractedPatch>& patches,
+                      const Pose& sensor_pose);
 
 /// Colour of a surface type in meshes, red green blue.
 std::array<std::uint8_t, 3> surfaceColor(SurfaceType surface);

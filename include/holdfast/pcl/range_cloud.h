@@ -6,17 +6,21 @@
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
+#include <memory>
 #include <string>
 #include <vector>
 
 namespace holdfast {
 
+/// One covariance per point of a cloud and in its frame, m^2.
+using Covariances = std::vector<Eigen::Matrix3f>;
+using CovariancesConstPtr = std::shared_ptr<const Covariances>;
+
 struct RangeCloud {
   /// Points in the frame of the cloud, m; organized when height > 1. Invalid: NaN.
   pcl::PointCloud<pcl::PointXYZ>::ConstPtr points;
-  /// One covariance per point in the same frame, m^2, or empty: the sensor's noise
-  /// model is used then.
-  std::vector<Eigen::Matrix3f> covariances;
+  /// One per point, or empty: the sensor's noise model is used then.
+  Covariances covariances;
   /// Where the sensor stood: q_cloud = R q_camera + c, camera frame of sensor/camera.h.
   Pose sensor_pose;
 };

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <holdfast/pcl/conversions.h>
+#include <holdfast/pcl/intrinsics.h>
+
+#include <pcl/common/io.h>
+
+#include <type_traits>
+
+namespace holdfast {
+
+template <typename PointT>
+RangeCloud
+toRangeCloud(const typename pcl::PointCloud<PointT>::ConstPtr& cloud,
+             std::string* notice)
+{
+  RangeCloud range;
+  if constexpr (std::is_same_v<PointT, pcl::PointXYZ>)
+    range.points = cloud;
+  else {
+    auto points = pcl::make_shared<pcl::PointCloud<pcl::PointXYZ>>();
+    pcl::copyPointCloud(*cloud, *points);
+    range.points = points;
+  }
+  if constexpr (std::is_same_v<PointT, PointXYZCovariance>) {
+    range.covariances.reserve(cloud->size());
+    for (const PointXYZCovariance& point : *cloud)
+      range.covariances.push_back(point.getCovarianceMatrix());
+  }
+  range.sensor_pose = sensorPose(cloud->sensor_origin_, cloud->sensor_orientation_);
+  if (validityError(range).empty())
+    range.sensor_pose = chooseSensorPose(range.points, range.sensor_pose, notice);
+  return range;
+}
+
+} // namespace holdfast

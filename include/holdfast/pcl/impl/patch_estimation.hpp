@@ -1,0 +1,209 @@
+#pragma once
+
+#include <holdfast/pcl/conversions.h>
+#include <holdfast/pcl/impl/input_check.hpp>
+#include <holdfast/pcl/patch_estimation.h>
+
+#include <pcl/common/copy_point.h>
+#include <pcl/common/point_tests.h>
+#include <pcl/console/print.h>
+#include <pcl/impl/pcl_base.hpp>
+#include <pcl/kdtree/impl/kdtree_flann.hpp>
+#include <pcl/search/impl/kdtree.hpp>
+#include <pcl/search/impl/organized.hpp>
+#include <pcl/search/impl/search.hpp>
+
+#include <algorithm>
+#include <exception>
+
+namespace holdfast {
+
+template <typename PointInT, typename PointOutT>
+std::string
+PatchEstimation<PointInT, PointOutT>::misuse() const
+{
+  std::string error = detail::inputError(*input_, *indices_);
+  if (error.empty() && surface_)
+    error = detail::inputError(*surface_);
+  if (!error.empty())
+    return error;
+  if (search_radius_ != 0.0 && k_ != 0)
+    return "both a radius and k are set: set one of them to zero";
+  if (!(search_radius_ >= 0.0) || k_ < 0)
+    return "the radius and k must not be negative";
+  if (uses_search_ && samplesSeeds())
+    return "seeds from the sampler go with its neighbourhoods, not with a search "
+           "method or surface";
+  return {};
+}
+
+template <typename PointInT, typename PointOutT>
+std::string
+PatchEstimation<PointInT, PointOutT>::searchMisuse() const
+{
+  const auto finite = [](const PointInT& point) { return pcl::isFinite(point); };
+  // What PCL's searches do in an empty tree is not defined.
+  if (std::none_of(surface_->begin(), surface_->end(), finite))
+    return "the search surface has no finite point";
+  using Organized = pcl::search::OrganizedNeighbor<PointInT>;
+  const auto* organized = dynamic_cast<const Organized*>(tree_.get());
+  if (organized != nullptr && !(surface_->isOrganized() && organized->isValid()))
+    return "an organized search needs an organized cloud from a projective camera";
+  return {};
+}
+
+template <typename PointInT, typename PointOutT>
+bool
+PatchEstimation<PointInT, PointOutT>::initCompute()
+{
+  results_.clear();
+  notices_.clear();
+  if (!pcl::PCLBase<PointInT>::initCompute())
+    return false;
+  uses_search_ = tree_ || (surface_ && surface_ != input_);
+  std::string error = misuse();
+  if (error.empty() && uses_search_) {
+    fake_tree_ = !tree_;
+    if (!pcl::Feature<PointInT, PointOutT>::initCompute())
+      return false;
+    error = searchMisuse();
+  }
+  if (error.empty()) {
+    try {
+      prepare();
+      return true;
+    }
+    catch (const std::exception& exception) {
+      error = exception.what();
+    }
+  }
+  PCL_ERROR("[holdfast::%s::compute] %s!\n", getClassName().c_str(), error.c_str());
+  deinitCompute();
+  return false;
+}
+
+template <typename PointInT, typename PointOutT>
+bool
+PatchEstimation<PointInT, PointOutT>::deinitCompute()
+{
+  if (fake_tree_)
+    tree_.reset();
+  fake_tree_ = false;
+  if (samplesSeeds())
+    indices_.reset();
+  work_.reset();
+  return pcl::Feature<PointInT, PointOutT>::deinitCompute();
+}
+
+template <typename PointInT, typename PointOutT>
+ExtractionOptions
+PatchEstimation<PointInT, PointOutT>::effectiveOptions() const
+{
+  ExtractionOptions options = options_;
+  SamplerOptions& sampler = options.sampler;
+  if (k_ > 0) {
+    sampler.neighborhood = Neighborhood::Knn;
+    sampler.k = k_;
+  }
+  if (search_radius_ > 0.0) {
+    sampler.radius_m = search_radius_;
+    if (sampler.neighborhood == Neighborhood::Knn)
+      sampler.neighborhood = Neighborhood::Disc;
+  }
+  return options;
+}
+
+template <typename PointInT, typename PointOutT>
+RangeCloud
+PatchEstimation<PointInT, PointOutT>::rangeCloud()
+{
+  std::string notice;
+  RangeCloud cloud = toRangeCloud<PointInT>(uses_search_ ? surface_ : input_, &notice);
+  if (sensor_pose_)
+    cloud.sensor_pose = *sensor_pose_;
+  else if (!notice.empty())
+    notices_.push_back(notice);
+  if (covariances_)
+    cloud.covariances = *covariances_;
+  return cloud;
+}
+
+template <typename PointInT, typename PointOutT>
+void
+PatchEstimation<PointInT, PointOutT>::prepare()
+{
+  const auto work = std::make_shared<Work>();
+  work->cloud = rangeCloud();
+  const ExtractionOptions options = effectiveOptions();
+  const PatchExtractor& extractor =
+      work->extractor.emplace(work->cloud, sensor_, options);
+  notices_.insert(notices_.end(),
+                  extractor.notices().begin(),
+                  extractor.notices().end());
+  if (!uses_search_)
+    work->sampler.emplace(work->cloud, extractor.sensor(), options.sampler);
+  // As indices, so that it is compute() that gives the output its size: a cloud must
+  // only be resized by code compiled for the instruction set it was allocated by.
+  if (samplesSeeds()) {
+    const std::vector<int> seeds = work->sampler->seeds();
+    indices_ = pcl::make_shared<pcl::Indices>(seeds.begin(), seeds.end());
+  }
+  work_ = work;
+}
+
+template <typename PointInT, typename PointOutT>
+std::vector<ExtractedPatch>
+PatchEstimation<PointInT, PointOutT>::fitBySearch() const
+{
+  std::vector<Seed> seeds;
+  for (const int index : *indices_)
+    seeds.push_back({index, (*input_)[index].getVector3fMap().template cast<double>()});
+  const auto search = [this](const Seed& seed, int, std::vector<int>& indices) {
+    indices.clear();
+    if (!seed.position.allFinite())
+      return;
+    pcl::Indices found;
+    std::vector<float> squared_distances;
+    this->searchForNeighbors(seed.index, search_parameter_, found, squared_distances);
+    indices.assign(found.begin(), found.end());
+    std::sort(indices.begin(), indices.end());
+  };
+  return work_->extractor->fitAround(seeds, search);
+}
+
+template <typename PointInT, typename PointOutT>
+std::vector<ExtractedPatch>
+PatchEstimation<PointInT, PointOutT>::fitBySampler() const
+{
+  return work_->extractor->fitAround(
+      std::vector<int>(indices_->begin(), indices_->end()),
+      *work_->sampler);
+}
+
+template <typename PointInT, typename PointOutT>
+void
+PatchEstimation<PointInT, PointOutT>::computeFeature(PointCloudOut& output)
+{
+  try {
+    results_ = uses_search_ ? fitBySearch() : fitBySampler();
+  }
+  catch (const std::exception& error) {
+    PCL_ERROR("[holdfast::%s::compute] %s!\n", getClassName().c_str(), error.what());
+    output.clear();
+    return;
+  }
+  // As many seeds as there are pixels would pass for an image of them.
+  if (samplesSeeds()) {
+    output.width = static_cast<std::uint32_t>(output.size());
+    output.height = 1;
+  }
+  for (std::size_t i = 0; i < results_.size(); ++i)
+    pcl::copyPoint(toPatchPoint(results_[i]), output[i]);
+  output.is_dense = std::all_of(results_.begin(), results_.end(), isAccepted);
+  writeSensorPose(work_->cloud.sensor_pose, output);
+}
+
+} // namespace holdfast
+
+#define PCL_INSTANTIATE_PatchEstimation(T, OutT) \
+  template class PCL_EXPORTS holdfast::PatchEstimation<T, OutT>;
