@@ -27,7 +27,8 @@ experiments()
           figureFiveExperiment(),
           figureSixExperiment(),
           neighborhoodsExperiment(),
-          noiseExperiment()};
+          noiseExperiment(),
+          pclExperiment()};
 }
 
 struct ExperimentArguments {

@@ -39,6 +39,7 @@ Experiment figureFiveExperiment();
 Experiment figureSixExperiment();
 Experiment neighborhoodsExperiment();
 Experiment noiseExperiment();
+Experiment pclExperiment();
 
 /// Adds --data DIR, the folder of recorded clouds (also from the environment variable
 /// HOLDFAST_DATA_DIR). `folder` must outlive the parsing.

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# Installs what is missing, builds everything and runs every test.
+# Installs what is missing, builds everything and runs every test, those of bad data and
+# misuse once more under AddressSanitizer and UndefinedBehaviorSanitizer.
 #
-#   test/run.sh [ctest options]     e.g. test/run.sh -R rotation
+#   test/run.sh [ctest options]     e.g. test/run.sh -R rotation, without sanitizers
 #
 # With CI=true warnings are errors.
 set -euo pipefail
@@ -15,4 +16,14 @@ werror=OFF
 
 install_packages build test
 build_in "$root/build-test" -DCMAKE_BUILD_TYPE=Release -DHOLDFAST_WERROR=$werror
-exec ctest --test-dir "$root/build-test" --output-on-failure --parallel 2 "$@"
+ctest --test-dir "$root/build-test" --output-on-failure --parallel 2 "$@"
+(($#)) && exit
+
+# Without Highway, whose vectors take sanitizers minutes to compile, and of the programs
+# only what is run.
+sanitized=(fit_degenerate pcl_misuse point_types)
+build_in "$root/build-sanitize" -DCMAKE_BUILD_TYPE=RelWithDebInfo \
+  -DHOLDFAST_SANITIZE="address;undefined" -DHOLDFAST_WITH_HIGHWAY=OFF \
+  -- "${sanitized[@]/#/test_}"
+ctest --test-dir "$root/build-sanitize" --output-on-failure --parallel 2 \
+  -R "^($(IFS="|" && echo "${sanitized[*]}"))\$"
