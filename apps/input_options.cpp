@@ -43,6 +43,12 @@ addInputOptions(CLI::App& command, InputOptions& options)
                   options.clouds,
                   "PCD, PLY or 16-bit depth PNG/PGM, or a folder: every cloud in it")
       ->required();
+  addSensorOptions(command, options);
+}
+
+void
+addSensorOptions(CLI::App& command, InputOptions& options)
+{
   command
       .add_option("--sensor",
                   options.sensor_name,

@@ -21,6 +21,9 @@ struct InputOptions {
 /// Adds CLOUD..., --sensor and --depth-scale. `options` must outlive the parsing.
 void addInputOptions(CLI::App& command, InputOptions& options);
 
+/// Adds --sensor and --depth-scale alone.
+void addSensorOptions(CLI::App& command, InputOptions& options);
+
 /// \throw CLI::ValidationError when there is no such sensor.
 Sensor loadSensorOption(const InputOptions& options);
 

@@ -16,6 +16,8 @@ constexpr const char* kExamples = R"(Examples:
   holdfast info rocks.pcd                   what is in a cloud
   holdfast fit rocks.pcd                    patches all over it, as a table
   holdfast fit rocks.pcd -o results         and as JSON and a coloured mesh
+  holdfast render results/rocks.patches.json -o rocks.png
+                                            and as a picture
   holdfast fit can.pcd --whole --surface cylinder --json -
                                             one patch to all points, as JSON
   holdfast experiment table1                are the covariances right?
@@ -45,6 +47,7 @@ run(int argc, char** argv)
   int exit_code = 0;
   holdfast::addFitCommand(app, exit_code);
   holdfast::addInfoCommand(app, exit_code);
+  holdfast::addRenderCommand(app, exit_code);
   holdfast::addSimulateCommand(app, exit_code);
   holdfast::addExperimentCommand(app, exit_code);
   try {
