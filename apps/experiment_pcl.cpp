@@ -337,7 +337,7 @@ Plot
 plotOf(const std::vector<Json>& rows)
 {
   Panel panel;
-  panel.title = "Radii from the same points (bars: two standard deviations)";
+  panel.title = "Radii from the same points";
   panel.y = {"error of the radius (mm)"};
   for (const Method& method : kMethods) {
     Series series{method.name, {}, {}, SeriesStyle::Markers};
@@ -414,8 +414,9 @@ run(const ExperimentSettings& settings)
       "same distance in metres; PCL's cylinder needs normals, of 20 neighbours each. "
       "The least squares are PCL's over all points, from the true surface. "
       "Bias and spread are of the trials that did not fail, times of the whole way.",
-      "PCL's principal curvatures are eigenvalues of a scatter of normals, without "
-      "unit: they do not change where the patch is scaled and its curvature halves."};
+      "PCL's principal curvatures are eigenvalues of a scatter of unit normals, which "
+      "has no unit: a surface of half the radius, seen over half the length, has twice "
+      "the curvature and nearly the same eigenvalue."};
   report.plot = plotOf(report.rows);
   return report;
 }

@@ -184,6 +184,29 @@ TEST_F(ExperimentProgram, NoiseJudgesTheModelsOnRecordedFrames)
   EXPECT_NE(json.at("remarks").dump().find("default sigmas"), std::string::npos);
 }
 
+TEST_F(ExperimentProgram, PclIsBiasedWhereHoldfastIsNot)
+{
+  const Json json = shortRun("pcl");
+  ASSERT_EQ(json.at("rows").size(), 20u); // five surfaces by four methods
+  for (const Json& row : json.at("rows")) {
+    SCOPED_TRACE(row.dump());
+    EXPECT_GT(row.at("microseconds").get<double>(), 0.0);
+    if (row.at("radius_bias_mm").is_null())
+      continue;
+    // Four standard errors of the mean of 20.
+    const double error =
+        4.0 * row.at("radius_spread_mm").get<double>() / std::sqrt(20.0);
+    const double bias = row.at("radius_bias_mm");
+    if (row.at("method") == "holdfast") {
+      EXPECT_LT(std::abs(bias), error);
+      EXPECT_EQ(row.at("failures"), 0);
+    }
+    if (row.at("method") == "pcl least squares") {
+      EXPECT_GT(std::abs(bias), error);
+    }
+  }
+}
+
 TEST_F(ExperimentProgram, WritesTableAndFiles)
 {
   const std::string out = folder_ + "/new/results";
