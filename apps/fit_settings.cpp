@@ -90,6 +90,22 @@ addNeighborhoodOptions(CLI::App& command, SamplerOptions& sampler)
       ->check(CLI::Range(1, 100000000, "N"))
       ->type_name("")
       ->group(group);
+  command
+      .add_option("--max-area",
+                  sampler.max_area_m2,
+                  "Stop when the patches cover this much surface together, square "
+                  "metres; what lies in several counts once")
+      ->check(positiveNumber("M2"))
+      ->type_name("")
+      ->group(group);
+  command
+      .add_option("--max-time",
+                  sampler.max_time_s,
+                  "Stop after this time, seconds; how many patches that are depends on "
+                  "the computer")
+      ->check(positiveNumber("S"))
+      ->type_name("")
+      ->group(group);
   addChoice(
       command,
       "--neighborhood",
@@ -269,10 +285,16 @@ addFitOptions(CLI::App& command, FitSettings& settings)
   addNeighborhoodOptions(command, settings.extraction.sampler);
   addValidationOptions(command, settings.extraction.validation.emplace());
   addRunOptions(command, settings);
-  exclude(
-      command,
-      "--whole",
-      {"--radius", "--spacing", "--seeds", "--neighborhood", "--k", "--seed-strategy"});
+  exclude(command,
+          "--whole",
+          {"--radius",
+           "--spacing",
+           "--seeds",
+           "--max-area",
+           "--max-time",
+           "--neighborhood",
+           "--k",
+           "--seed-strategy"});
   exclude(command, "--paper", {"--residual"});
   tidyHelp(command);
 }

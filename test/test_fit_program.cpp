@@ -200,6 +200,9 @@ TEST(FitProgram, OptionsReachTheFit)
   EXPECT_EQ(planes["patches"][0]["surface"], "plane");
   EXPECT_EQ(planes["patches"][0]["boundary"], "quad");
   EXPECT_LE(fit({"--seeds", "5"})["patches"].size(), 5U);
+  const Json covering = fit({"--max-area", "0.004", "--max-time", "1000"});
+  EXPECT_LT(covering["patches"].size(), fit({})["patches"].size());
+  EXPECT_EQ(covering["options"]["sampler"]["max_area"], 0.004);
   EXPECT_EQ(fit({"--radius", "0.07"})["patches"][0]["radius"], 0.07);
   const Json knn = fit({"--neighborhood", "knn", "--k", "50"});
   EXPECT_EQ(knn["patches"][0]["points"], 50);

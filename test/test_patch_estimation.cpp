@@ -118,6 +118,30 @@ TEST(Seeds, FromTheSamplerGiveWhatTheEngineGives)
         sameBytes(toPatchPoint(result.patches[i]), toPatchPoint(expected.patches[i])));
 }
 
+TEST(Seeds, FromTheSamplerStopAtItsLimits)
+{
+  Random random;
+  const auto cloud = makeGround(random);
+  auto estimation = makeEstimation(cloud);
+  ExtractionOptions options;
+  options.sampler.radius_m = 0.08;
+  options.sampler.max_area_m2 = 0.1;
+  estimation.setOptions(options);
+  estimation.setSeedsFromSampler(true);
+  Patches patches;
+  estimation.compute(patches);
+  const std::size_t few = patches.size();
+  EXPECT_GT(few, 2U);
+  EXPECT_EQ(patches.width, few);
+  EXPECT_EQ(estimation.getResults().size(), few);
+  EXPECT_EQ(estimation.getNotices().size(), 1U);
+  options.sampler.max_area_m2 = 0.0;
+  estimation.setOptions(options);
+  estimation.compute(patches);
+  EXPECT_GT(patches.size(), 2 * few);
+  EXPECT_TRUE(estimation.getNotices().empty());
+}
+
 TEST(Seeds, AreTheIndicesInTheirOrder)
 {
   Random random;

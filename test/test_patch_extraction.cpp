@@ -2,7 +2,9 @@
 #include "support/random.h"
 
 #include <holdfast/fit/reference_points.h>
+#include <holdfast/patch/boundary.h>
 #include <holdfast/pcl/patch_extraction.h>
+#include <holdfast/pcl/sampling_budget.h>
 #include <holdfast/sensor/constant_noise_model.h>
 #include <holdfast/sensor/dryanovski_noise_model.h>
 
@@ -216,6 +218,60 @@ TEST(ExtractPatches, KeepsTheOrderOfTheSeedsAndCountsTheRest)
     ASSERT_NE(next, seeds.end());
     EXPECT_EQ(p.seed, (*cloud.points)[*p.seed_index].getVector3fMap().cast<double>());
   }
+}
+
+std::vector<int>
+seedsOf(const ExtractionResult& result)
+{
+  std::vector<int> seeds;
+  for (const ExtractedPatch& patch : result.patches)
+    seeds.push_back(*patch.seed_index);
+  return seeds;
+}
+
+TEST(ExtractPatches, StopsWhenTheAreaIsCovered)
+{
+  Random random;
+  const RangeCloud cloud = makeRollingCloud(random);
+  const Sensor sensor = makeSensor(kCamera);
+  ExtractionOptions options = makeOptions();
+  options.sampler.max_area_m2 = 1e3;
+  const std::vector<int> all = seedsOf(extractPatches(cloud, sensor, options));
+
+  options.sampler.max_area_m2 = 0.2;
+  const ExtractionResult some = extractPatches(cloud, sensor, options);
+  const std::vector<int> seeds = seedsOf(some);
+  ASSERT_LT(seeds.size(), all.size());
+  EXPECT_TRUE(std::equal(seeds.begin(), seeds.end(), all.begin()));
+  ASSERT_EQ(some.notices.size(), 1U);
+  EXPECT_NE(some.notices[0].find("stopped at the limit"), std::string::npos);
+
+  const NeighborhoodSampler sampler(cloud, sensor, options.sampler);
+  const auto scratch = sampler.makeScratch();
+  SamplingBudget budget(options.sampler, cloud.points->size());
+  std::vector<int> indices;
+  for (const ExtractedPatch& patch : some.patches) {
+    EXPECT_FALSE(budget.isSpent());
+    sampler.neighborhood(*patch.seed_index, *scratch, indices);
+    budget.cover(indices, projectedArea(patch.fit.patch));
+  }
+  EXPECT_TRUE(budget.isSpent());
+
+  for (const int threads : {2, 3, 7}) {
+    options.threads = threads;
+    EXPECT_EQ(seedsOf(extractPatches(cloud, sensor, options)), seeds) << threads;
+  }
+}
+
+TEST(ExtractPatches, StopsWhenTheTimeIsOver)
+{
+  Random random;
+  ExtractionOptions options = makeOptions(0.08, 0.01);
+  options.sampler.max_time_s = 1e-12; // over before the second look
+  const ExtractionResult result =
+      extractPatches(makeRollingCloud(random), makeSensor(kCamera), options);
+  EXPECT_LE(result.patches.size(), 32U);
+  EXPECT_EQ(result.notices.size(), 1U);
 }
 
 /// The covariances that the sensor's model gives, attached to the cloud.

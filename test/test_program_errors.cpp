@@ -83,6 +83,8 @@ TEST_F(ProgramErrors, UsageErrorsExitWithTwo)
       {good_, "--spacing", "0"},
       {good_, "--seeds", "0"},
       {good_, "--seeds", "2.5"},
+      {good_, "--max-area", "0"},
+      {good_, "--max-time", "-1"},
       {good_, "--threads", "-1"},
       {good_, "--containment", "0"},
       {good_, "--containment", "1"},
@@ -99,6 +101,7 @@ TEST_F(ProgramErrors, UsageErrorsExitWithTwo)
       {good_, "--whole", "--radius", "0.1"},
       {good_, "--whole", "--seeds", "3"},
       {good_, "--whole", "--spacing", "0.1"},
+      {good_, "--whole", "--max-area", "1"},
       {good_, "--whole", "--neighborhood", "ball"},
       {good_, "--whole", "--seed-strategy", "random"}};
   for (auto arguments : cases) {

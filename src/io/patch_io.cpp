@@ -80,6 +80,14 @@ sensorJson(const Sensor& sensor, const Pose& pose)
           {"orientation_wxyz", {q.w(), q.x(), q.y(), q.z()}}};
 }
 
+/// Null where there is none.
+template <typename T>
+Json
+limitJson(T limit)
+{
+  return limit > 0 ? Json(limit) : Json();
+}
+
 Json
 samplerJson(const SamplerOptions& sampler)
 {
@@ -89,8 +97,10 @@ samplerJson(const SamplerOptions& sampler)
   else
     json["radius"] = sampler.radius_m;
   json["seed_strategy"] = nameOf(kSeedStrategies, sampler.strategy);
-  json["seeds"] = sampler.max_seeds > 0 ? Json(sampler.max_seeds) : Json();
+  json["seeds"] = limitJson(sampler.max_seeds);
   json["spacing"] = sampler.spacing_m;
+  json["max_area"] = limitJson(sampler.max_area_m2);
+  json["max_time"] = limitJson(sampler.max_time_s);
   json["random_seed"] = sampler.random_seed;
   return json;
 }

@@ -1,5 +1,7 @@
 #include <holdfast/pcl/neighborhood_sampler.h>
 
+#include <holdfast/pcl/sampling_budget.h>
+
 #include "path_search.h"
 #include "pixel_disc.h"
 #include "seeds.h"
@@ -54,6 +56,7 @@ struct NeighborhoodSampler::Impl {
   bool isValid(int index) const;
   std::vector<int> validPoints() const;
   std::vector<int> gridSeeds(int max_seeds) const;
+  std::vector<int> shuffled(std::vector<int> seeds) const;
   std::vector<int> seeds() const;
 
   void disc(int seed, Scratch& scratch, std::vector<int>& indices) const;
@@ -344,11 +347,19 @@ NeighborhoodSampler::Impl::gridSeeds(int max_seeds) const
 }
 
 std::vector<int>
+NeighborhoodSampler::Impl::shuffled(std::vector<int> seeds) const
+{
+  const std::size_t count = seeds.size();
+  return randomSeeds(std::move(seeds), count, options.random_seed);
+}
+
+std::vector<int>
 NeighborhoodSampler::Impl::seeds() const
 {
   switch (options.strategy) {
   case SeedStrategy::Grid:
-    return gridSeeds(options.max_seeds);
+    return isLimited(options) ? shuffled(gridSeeds(options.max_seeds)) :
+                                gridSeeds(options.max_seeds);
   case SeedStrategy::Random: {
     const std::size_t count = options.max_seeds > 0 ?
                                   static_cast<std::size_t>(options.max_seeds) :
@@ -376,6 +387,10 @@ validityError(const SamplerOptions& options)
     return "the number of seeds must not be negative";
   if (!isPositive(options.spacing_m))
     return "the seed spacing must be a positive number of metres";
+  if (!isNotNegative(options.max_area_m2))
+    return "the area to cover must not be a negative number of square metres";
+  if (!isNotNegative(options.max_time_s))
+    return "the time must not be a negative number of seconds";
   if (!isNotNegative(options.jump_sigmas))
     return "the depth jump must not be a negative number of sigmas";
   if (!isNotNegative(options.max_slope))
@@ -395,6 +410,12 @@ std::vector<int>
 NeighborhoodSampler::seeds() const
 {
   return impl_->seeds();
+}
+
+const SamplerOptions&
+NeighborhoodSampler::options() const
+{
+  return impl_->options;
 }
 
 NeighborhoodSampler::ScratchPtr

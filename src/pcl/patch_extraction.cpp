@@ -1,8 +1,10 @@
 #include <holdfast/pcl/patch_extraction.h>
 
-#include "point_gatherer.h"
-
+#include <holdfast/patch/boundary.h>
+#include <holdfast/pcl/sampling_budget.h>
 #include <holdfast/sensor/constant_noise_model.h>
+
+#include "point_gatherer.h"
 
 #include <pcl/common/point_tests.h>
 
@@ -115,6 +117,10 @@ checkedThreads(int threads)
   return threads > 0 ? threads : omp_get_max_threads();
 }
 
+/// Fits between two looks at the limits, a few milliseconds' worth. The same for any
+/// number of threads, since the result must be.
+constexpr std::size_t kFitsPerLook = 32;
+
 /// Tells the caller how far the work is, from one thread at a time, never backwards.
 class ProgressReport {
 public:
@@ -184,6 +190,15 @@ struct PatchExtractor::Impl {
                          const Eigen::Vector3d& origin,
                          PointBatch& batch) const;
 
+  std::vector<ExtractedPatch> fitAround(const std::vector<Seed>& seeds,
+                                        const NeighborhoodSearch& search,
+                                        ProgressReport& progress) const;
+
+  std::vector<Seed> places(const std::vector<int>& indices) const;
+
+  /// Refers to the sampler.
+  NeighborhoodSearch searchOf(const NeighborhoodSampler& sampler) const;
+
   const RangeCloud& cloud;
   std::vector<std::string> notices;
   Sensor sensor;
@@ -208,6 +223,51 @@ PatchExtractor::Impl::attempt(const std::vector<int>& indices,
   return patch;
 }
 
+std::vector<ExtractedPatch>
+PatchExtractor::Impl::fitAround(const std::vector<Seed>& seeds,
+                                const NeighborhoodSearch& search,
+                                ProgressReport& report) const
+{
+  struct Workspace {
+    std::vector<int> indices;
+    PointBatch batch;
+  };
+  std::vector<Workspace> workspaces(static_cast<std::size_t>(threads));
+  std::vector<ExtractedPatch> attempts(seeds.size());
+  parallelFor(static_cast<int>(seeds.size()), threads, [&](int i, int thread) {
+    const Seed& seed = seeds[i];
+    Workspace& work = workspaces[thread];
+    search(seed, thread, work.indices);
+    attempts[i] = attempt(work.indices, seed.position, work.batch);
+    attempts[i].seed_index = seed.index;
+    attempts[i].seed = seed.position;
+    attempts[i].radius_m = radius_m;
+    report.oneDone();
+  });
+  return attempts;
+}
+
+std::vector<Seed>
+PatchExtractor::Impl::places(const std::vector<int>& indices) const
+{
+  std::vector<Seed> seeds;
+  seeds.reserve(indices.size());
+  for (const int index : indices)
+    seeds.push_back({index, position(cloud, index)});
+  return seeds;
+}
+
+NeighborhoodSearch
+PatchExtractor::Impl::searchOf(const NeighborhoodSampler& sampler) const
+{
+  auto scratch = std::make_shared<std::vector<NeighborhoodSampler::ScratchPtr>>();
+  for (int thread = 0; thread < threads; ++thread)
+    scratch->push_back(sampler.makeScratch());
+  return [&sampler, scratch](const Seed& seed, int thread, std::vector<int>& indices) {
+    sampler.neighborhood(seed.index, *(*scratch)[thread], indices);
+  };
+}
+
 PatchExtractor::PatchExtractor(const RangeCloud& cloud,
                                const Sensor& sensor,
                                const ExtractionOptions& options)
@@ -220,42 +280,46 @@ std::vector<ExtractedPatch>
 PatchExtractor::fitAround(const std::vector<Seed>& seeds,
                           const NeighborhoodSearch& search) const
 {
-  struct Workspace {
-    std::vector<int> indices;
-    PointBatch batch;
-  };
-  const int n = static_cast<int>(seeds.size());
-  std::vector<Workspace> workspaces(static_cast<std::size_t>(impl_->threads));
-  std::vector<ExtractedPatch> attempts(seeds.size());
-  ProgressReport progress(impl_->progress, n);
-  parallelFor(n, impl_->threads, [&](int i, int thread) {
-    const Seed& seed = seeds[i];
-    Workspace& work = workspaces[thread];
-    search(seed, thread, work.indices);
-    attempts[i] = impl_->attempt(work.indices, seed.position, work.batch);
-    attempts[i].seed_index = seed.index;
-    attempts[i].seed = seed.position;
-    attempts[i].radius_m = impl_->radius_m;
-    progress.oneDone();
-  });
-  return attempts;
+  ProgressReport progress(impl_->progress, static_cast<int>(seeds.size()));
+  return impl_->fitAround(seeds, search, progress);
 }
 
 std::vector<ExtractedPatch>
 PatchExtractor::fitAround(const std::vector<int>& seeds,
                           const NeighborhoodSampler& sampler) const
 {
-  std::vector<Seed> places;
-  places.reserve(seeds.size());
-  for (const int index : seeds)
-    places.push_back({index, position(impl_->cloud, index)});
-  std::vector<NeighborhoodSampler::ScratchPtr> scratch;
-  for (int thread = 0; thread < impl_->threads; ++thread)
-    scratch.push_back(sampler.makeScratch());
-  return fitAround(places,
-                   [&](const Seed& seed, int thread, std::vector<int>& indices) {
-                     sampler.neighborhood(seed.index, *scratch[thread], indices);
-                   });
+  return fitAround(impl_->places(seeds), impl_->searchOf(sampler));
+}
+
+std::vector<ExtractedPatch>
+PatchExtractor::fitSampled(const NeighborhoodSampler& sampler,
+                           std::string* notice) const
+{
+  if (!isLimited(sampler.options()))
+    return fitAround(sampler.seeds(), sampler);
+  SamplingBudget budget(sampler.options(), impl_->cloud.points->size());
+  const std::vector<Seed> seeds = impl_->places(sampler.seeds());
+  const NeighborhoodSearch search = impl_->searchOf(sampler);
+  ProgressReport progress(impl_->progress, static_cast<int>(seeds.size()));
+  std::vector<ExtractedPatch> attempts;
+  std::vector<int> indices;
+  while (attempts.size() < seeds.size() && !budget.isSpent()) {
+    const auto next = seeds.begin() + static_cast<std::ptrdiff_t>(attempts.size());
+    const auto end = next + std::min<std::ptrdiff_t>(kFitsPerLook, seeds.end() - next);
+    std::vector<ExtractedPatch> some = impl_->fitAround({next, end}, search, progress);
+    for (auto patch = some.begin(); patch != some.end() && !budget.isSpent(); ++patch) {
+      if (sampler.options().max_area_m2 > 0.0 && isAccepted(*patch)) {
+        search(next[patch - some.begin()], 0, indices);
+        budget.cover(indices, projectedArea(patch->fit.patch));
+      }
+      attempts.push_back(std::move(*patch));
+    }
+  }
+  if (notice && attempts.size() < seeds.size())
+    *notice = "stopped at the limit of area or time after " +
+              std::to_string(attempts.size()) + " of " + std::to_string(seeds.size()) +
+              " seeds";
+  return attempts;
 }
 
 ExtractedPatch
@@ -330,7 +394,11 @@ extractPatches(const RangeCloud& cloud,
 {
   const PatchExtractor extractor(cloud, sensor, options);
   const NeighborhoodSampler sampler(cloud, extractor.sensor(), options.sampler);
-  return resultOf(extractor, extractor.fitAround(sampler.seeds(), sampler));
+  std::string notice;
+  ExtractionResult result = resultOf(extractor, extractor.fitSampled(sampler, &notice));
+  if (!notice.empty())
+    result.notices.push_back(notice);
+  return result;
 }
 
 ExtractionResult

@@ -130,8 +130,8 @@ public:
     options_.threads = static_cast<int>(threads);
   }
 
-  /// Without indices, choose the seeds as the sampler options say; not together with a
-  /// search method or surface.
+  /// Without indices, choose the seeds as the sampler options say, up to their limits;
+  /// not together with a search method or surface.
   void setSeedsFromSampler(bool from_sampler)
   {
     seeds_from_sampler_ = from_sampler;
@@ -183,7 +183,7 @@ private:
   RangeCloud rangeCloud();
   void prepare();
   std::vector<ExtractedPatch> fitBySearch() const;
-  std::vector<ExtractedPatch> fitBySampler() const;
+  std::vector<ExtractedPatch> fitBySampler();
   void computeFeature(PointCloudOut& output) override;
 
   Sensor sensor_;

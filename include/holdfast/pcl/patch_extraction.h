@@ -93,6 +93,12 @@ public:
   std::vector<ExtractedPatch> fitAround(const std::vector<int>& seeds,
                                         const NeighborhoodSampler& sampler) const;
 
+  /// The same with all seeds of the sampler or, where its options limit area or time,
+  /// the first ones, until the accepted patches cover the area or the time is over.
+  /// Time is looked at every few fits only. \param notice is set when seeds were left.
+  std::vector<ExtractedPatch> fitSampled(const NeighborhoodSampler& sampler,
+                                         std::string* notice = nullptr) const;
+
   /// One attempt at all finite points.
   ExtractedPatch fitWhole() const;
 
@@ -108,7 +114,8 @@ private:
   std::unique_ptr<const Impl> impl_;
 };
 
-/// Samples seeds and neighbourhoods and fits a patch to each.
+/// Samples seeds and neighbourhoods and fits a patch to each, up to the sampler's
+/// limits.
 /// \throw std::invalid_argument on options or clouds that make no sense.
 ExtractionResult extractPatches(const RangeCloud& cloud,
                                 const Sensor& sensor,

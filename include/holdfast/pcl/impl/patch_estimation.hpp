@@ -173,8 +173,16 @@ PatchEstimation<PointInT, PointOutT>::fitBySearch() const
 
 template <typename PointInT, typename PointOutT>
 std::vector<ExtractedPatch>
-PatchEstimation<PointInT, PointOutT>::fitBySampler() const
+PatchEstimation<PointInT, PointOutT>::fitBySampler()
 {
+  if (samplesSeeds()) {
+    std::string notice;
+    std::vector<ExtractedPatch> results =
+        work_->extractor->fitSampled(*work_->sampler, &notice);
+    if (!notice.empty())
+      notices_.push_back(notice);
+    return results;
+  }
   return work_->extractor->fitAround(
       std::vector<int>(indices_->begin(), indices_->end()),
       *work_->sampler);
@@ -192,8 +200,10 @@ PatchEstimation<PointInT, PointOutT>::computeFeature(PointCloudOut& output)
     output.clear();
     return;
   }
-  // As many seeds as there are pixels would pass for an image of them.
+  // A limit may have left seeds out, and as many seeds as there are pixels would pass
+  // for an image of them.
   if (samplesSeeds()) {
+    output.resize(results_.size());
     output.width = static_cast<std::uint32_t>(output.size());
     output.height = 1;
   }

@@ -1,0 +1,41 @@
+#include <holdfast/pcl/sampling_budget.h>
+
+namespace holdfast {
+
+bool
+isLimited(const SamplerOptions& options)
+{
+  return options.max_area_m2 > 0.0 || options.max_time_s > 0.0;
+}
+
+SamplingBudget::SamplingBudget(const SamplerOptions& options, std::size_t points)
+: max_area_m2_(options.max_area_m2)
+, max_time_s_(options.max_time_s)
+, covered_(points, false)
+{}
+
+void
+SamplingBudget::cover(const std::vector<int>& indices, double area_m2)
+{
+  std::size_t fresh = 0;
+  for (const int index : indices) {
+    auto covered = covered_.at(static_cast<std::size_t>(index));
+    fresh += covered ? 0 : 1;
+    covered = true;
+  }
+  if (fresh > 0)
+    area_m2_ +=
+        area_m2 * static_cast<double>(fresh) / static_cast<double>(indices.size());
+}
+
+bool
+SamplingBudget::isSpent() const
+{
+  if (max_area_m2_ > 0.0 && area_m2_ >= max_area_m2_)
+    return true;
+  const std::chrono::duration<double> elapsed =
+      std::chrono::steady_clock::now() - start_;
+  return max_time_s_ > 0.0 && elapsed.count() >= max_time_s_;
+}
+
+} // namespace holdfast
