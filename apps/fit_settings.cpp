@@ -91,6 +91,13 @@ addNeighborhoodOptions(CLI::App& command, SamplerOptions& sampler)
       ->type_name("")
       ->group(group);
   command
+      .add_option("--max-patches",
+                  sampler.max_patches,
+                  "Stop after so many patches, those turned down not counted")
+      ->check(CLI::Range(1, 100000000, "N"))
+      ->type_name("")
+      ->group(group);
+  command
       .add_option("--max-area",
                   sampler.max_area_m2,
                   "Stop when the patches cover this much surface together, square "
@@ -290,6 +297,7 @@ addFitOptions(CLI::App& command, FitSettings& settings)
           {"--radius",
            "--spacing",
            "--seeds",
+           "--max-patches",
            "--max-area",
            "--max-time",
            "--neighborhood",

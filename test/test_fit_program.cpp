@@ -200,6 +200,7 @@ TEST(FitProgram, OptionsReachTheFit)
   EXPECT_EQ(planes["patches"][0]["surface"], "plane");
   EXPECT_EQ(planes["patches"][0]["boundary"], "quad");
   EXPECT_LE(fit({"--seeds", "5"})["patches"].size(), 5U);
+  EXPECT_EQ(fit({"--max-patches", "3"})["patches"].size(), 3U);
   const Json covering = fit({"--max-area", "0.004", "--max-time", "1000"});
   EXPECT_LT(covering["patches"].size(), fit({})["patches"].size());
   EXPECT_EQ(covering["options"]["sampler"]["max_area"], 0.004);

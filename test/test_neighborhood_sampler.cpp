@@ -598,6 +598,7 @@ TEST(Degenerate, MisuseThrows)
   expectThrow([](SamplerOptions& o) { o.k = 0; });
   expectThrow([](SamplerOptions& o) { o.max_seeds = -1; });
   expectThrow([](SamplerOptions& o) { o.spacing_m = -0.1; });
+  expectThrow([](SamplerOptions& o) { o.max_patches = -1; });
   expectThrow([](SamplerOptions& o) { o.max_area_m2 = -1.0; });
   expectThrow([](SamplerOptions& o) { o.max_time_s = std::nan(""); });
   expectThrow([](SamplerOptions& o) { o.jump_sigmas = -1.0; });

@@ -83,6 +83,7 @@ TEST_F(ProgramErrors, UsageErrorsExitWithTwo)
       {good_, "--spacing", "0"},
       {good_, "--seeds", "0"},
       {good_, "--seeds", "2.5"},
+      {good_, "--max-patches", "0"},
       {good_, "--max-area", "0"},
       {good_, "--max-time", "-1"},
       {good_, "--threads", "-1"},

@@ -31,11 +31,24 @@ TEST(SamplingBudget, CountsEachPointOnce)
   EXPECT_EQ(budget.coveredArea(), 2.0);
   budget.cover({}, 2.0);
   EXPECT_EQ(budget.coveredArea(), 2.0);
-  EXPECT_FALSE(budget.isSpent());
+  EXPECT_FALSE(budget.isFull());
   budget.cover({2, 3, 4, 5}, 3.0); // half of it is new
   EXPECT_EQ(budget.coveredArea(), 3.5);
   EXPECT_TRUE(budget.isSpent());
   EXPECT_THROW(budget.cover({10}, 1.0), std::out_of_range);
+}
+
+TEST(SamplingBudget, CountsPatches)
+{
+  SamplerOptions options;
+  options.max_patches = 2;
+  EXPECT_TRUE(isLimited(options));
+  SamplingBudget budget(options, 3);
+  budget.cover({0, 1}, 1.0);
+  EXPECT_FALSE(budget.isFull());
+  budget.cover({0, 1}, 1.0);
+  EXPECT_TRUE(budget.isFull());
+  EXPECT_TRUE(budget.isSpent());
 }
 
 TEST(SamplingBudget, IsNeverSpentWithoutLimits)

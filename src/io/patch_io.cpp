@@ -99,6 +99,7 @@ samplerJson(const SamplerOptions& sampler)
   json["seed_strategy"] = nameOf(kSeedStrategies, sampler.strategy);
   json["seeds"] = limitJson(sampler.max_seeds);
   json["spacing"] = sampler.spacing_m;
+  json["max_patches"] = limitJson(sampler.max_patches);
   json["max_area"] = limitJson(sampler.max_area_m2);
   json["max_time"] = limitJson(sampler.max_time_s);
   json["random_seed"] = sampler.random_seed;

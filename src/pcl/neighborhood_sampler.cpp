@@ -387,6 +387,8 @@ validityError(const SamplerOptions& options)
     return "the number of seeds must not be negative";
   if (!isPositive(options.spacing_m))
     return "the seed spacing must be a positive number of metres";
+  if (options.max_patches < 0)
+    return "the number of patches must not be negative";
   if (!isNotNegative(options.max_area_m2))
     return "the area to cover must not be a negative number of square metres";
   if (!isNotNegative(options.max_time_s))

@@ -194,11 +194,18 @@ struct PatchExtractor::Impl {
                                         const NeighborhoodSearch& search,
                                         ProgressReport& progress) const;
 
+  /// Moves attempts over one by one, as long as the budget is not full.
+  static void keepUntilFull(std::vector<ExtractedPatch> some,
+                            const NeighborhoodSearch& search,
+                            SamplingBudget& budget,
+                            std::vector<ExtractedPatch>& attempts);
+
   std::vector<Seed> places(const std::vector<int>& indices) const;
 
   /// Refers to the sampler.
   NeighborhoodSearch searchOf(const NeighborhoodSampler& sampler) const;
 
+  const SamplingBudget::Clock::time_point start = SamplingBudget::Clock::now();
   const RangeCloud& cloud;
   std::vector<std::string> notices;
   Sensor sensor;
@@ -247,6 +254,24 @@ PatchExtractor::Impl::fitAround(const std::vector<Seed>& seeds,
   return attempts;
 }
 
+void
+PatchExtractor::Impl::keepUntilFull(std::vector<ExtractedPatch> some,
+                                    const NeighborhoodSearch& search,
+                                    SamplingBudget& budget,
+                                    std::vector<ExtractedPatch>& attempts)
+{
+  std::vector<int> indices;
+  for (ExtractedPatch& patch : some) {
+    if (budget.isFull())
+      return;
+    if (isAccepted(patch) && budget.countsPatches()) {
+      search({*patch.seed_index, patch.seed}, 0, indices);
+      budget.cover(indices, projectedArea(patch.fit.patch));
+    }
+    attempts.push_back(std::move(patch));
+  }
+}
+
 std::vector<Seed>
 PatchExtractor::Impl::places(const std::vector<int>& indices) const
 {
@@ -292,34 +317,37 @@ PatchExtractor::fitAround(const std::vector<int>& seeds,
 }
 
 std::vector<ExtractedPatch>
-PatchExtractor::fitSampled(const NeighborhoodSampler& sampler,
-                           std::string* notice) const
+PatchExtractor::fitWithinLimits(const std::vector<int>& seeds,
+                                const NeighborhoodSampler& sampler,
+                                std::string* notice) const
 {
   if (!isLimited(sampler.options()))
-    return fitAround(sampler.seeds(), sampler);
-  SamplingBudget budget(sampler.options(), impl_->cloud.points->size());
-  const std::vector<Seed> seeds = impl_->places(sampler.seeds());
+    return fitAround(seeds, sampler);
+  SamplingBudget budget(sampler.options(), impl_->cloud.points->size(), impl_->start);
+  const std::vector<Seed> places = impl_->places(seeds);
   const NeighborhoodSearch search = impl_->searchOf(sampler);
   ProgressReport progress(impl_->progress, static_cast<int>(seeds.size()));
   std::vector<ExtractedPatch> attempts;
-  std::vector<int> indices;
-  while (attempts.size() < seeds.size() && !budget.isSpent()) {
-    const auto next = seeds.begin() + static_cast<std::ptrdiff_t>(attempts.size());
-    const auto end = next + std::min<std::ptrdiff_t>(kFitsPerLook, seeds.end() - next);
-    std::vector<ExtractedPatch> some = impl_->fitAround({next, end}, search, progress);
-    for (auto patch = some.begin(); patch != some.end() && !budget.isSpent(); ++patch) {
-      if (sampler.options().max_area_m2 > 0.0 && isAccepted(*patch)) {
-        search(next[patch - some.begin()], 0, indices);
-        budget.cover(indices, projectedArea(patch->fit.patch));
-      }
-      attempts.push_back(std::move(*patch));
-    }
+  while (attempts.size() < places.size() && !budget.isSpent()) {
+    const auto next = places.begin() + static_cast<std::ptrdiff_t>(attempts.size());
+    const auto end = next + std::min<std::ptrdiff_t>(kFitsPerLook, places.end() - next);
+    impl_->keepUntilFull(impl_->fitAround({next, end}, search, progress),
+                         search,
+                         budget,
+                         attempts);
   }
   if (notice && attempts.size() < seeds.size())
-    *notice = "stopped at the limit of area or time after " +
+    *notice = "stopped at the limit of patches, area or time after " +
               std::to_string(attempts.size()) + " of " + std::to_string(seeds.size()) +
               " seeds";
   return attempts;
+}
+
+std::vector<ExtractedPatch>
+PatchExtractor::fitSampled(const NeighborhoodSampler& sampler,
+                           std::string* notice) const
+{
+  return fitWithinLimits(sampler.seeds(), sampler, notice);
 }
 
 ExtractedPatch
@@ -374,18 +402,14 @@ sortOut(std::vector<ExtractedPatch> attempts)
   return result;
 }
 
-namespace {
-
 ExtractionResult
-resultOf(const PatchExtractor& extractor, std::vector<ExtractedPatch> attempts)
+sortOut(std::vector<ExtractedPatch> attempts, const PatchExtractor& extractor)
 {
   ExtractionResult result = sortOut(std::move(attempts));
   result.invalid_covariances = extractor.countInvalidCovariances();
   result.notices = extractor.notices();
   return result;
 }
-
-} // namespace
 
 ExtractionResult
 extractPatches(const RangeCloud& cloud,
@@ -395,7 +419,7 @@ extractPatches(const RangeCloud& cloud,
   const PatchExtractor extractor(cloud, sensor, options);
   const NeighborhoodSampler sampler(cloud, extractor.sensor(), options.sampler);
   std::string notice;
-  ExtractionResult result = resultOf(extractor, extractor.fitSampled(sampler, &notice));
+  ExtractionResult result = sortOut(extractor.fitSampled(sampler, &notice), extractor);
   if (!notice.empty())
     result.notices.push_back(notice);
   return result;
@@ -407,7 +431,7 @@ extractWhole(const RangeCloud& cloud,
              const ExtractionOptions& options)
 {
   const PatchExtractor extractor(cloud, sensor, options);
-  return resultOf(extractor, {extractor.fitWhole()});
+  return sortOut({extractor.fitWhole()}, extractor);
 }
 
 } // namespace holdfast

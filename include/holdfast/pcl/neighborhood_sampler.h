@@ -37,8 +37,9 @@ struct SamplerOptions {
   SeedStrategy strategy = SeedStrategy::Grid;
   int max_seeds = 0; ///< 0: as many as the spacing gives (Random: as many as on a Grid)
   double spacing_m = 0.05; ///< between seeds (on a Grid: at the median depth)
-  /// Stop when the neighbourhoods cover this much surface, or after this time; 0: never
-  /// (sampling_budget.h).
+  /// Stop when there are so many patches, when they cover this much surface, or after
+  /// this time; 0: never (sampling_budget.h).
+  int max_patches = 0;
   double max_area_m2 = 0.0;
   double max_time_s = 0.0;
   std::uint64_t random_seed = 1;
@@ -76,8 +77,8 @@ public:
   ~NeighborhoodSampler();
 
   /// Indices of valid points: ascending on a Grid, in the order drawn otherwise. A Grid
-  /// with more than max_seeds is made coarser, so that it still spans the cloud; with a
-  /// limit of area or time it is shuffled, for the same reason.
+  /// with more than max_seeds is made coarser, so that it still spans the cloud; when
+  /// sampling may stop early it is shuffled, for the same reason.
   std::vector<int> seeds() const;
 
   const SamplerOptions& options() const;

@@ -93,9 +93,15 @@ public:
   std::vector<ExtractedPatch> fitAround(const std::vector<int>& seeds,
                                         const NeighborhoodSampler& sampler) const;
 
-  /// The same with all seeds of the sampler or, where its options limit area or time,
-  /// the first ones, until the accepted patches cover the area or the time is over.
-  /// Time is looked at every few fits only. \param notice is set when seeds were left.
+  /// The same with the first of the seeds, until the limits that the options of the
+  /// sampler set to patches, area or time are reached. Only accepted patches count; the
+  /// time runs from the construction of this object and is looked at every few fits.
+  /// \param notice is set when seeds were left.
+  std::vector<ExtractedPatch> fitWithinLimits(const std::vector<int>& seeds,
+                                              const NeighborhoodSampler& sampler,
+                                              std::string* notice = nullptr) const;
+
+  /// The same with the seeds of the sampler.
   std::vector<ExtractedPatch> fitSampled(const NeighborhoodSampler& sampler,
                                          std::string* notice = nullptr) const;
 
@@ -113,6 +119,10 @@ private:
   struct Impl;
   std::unique_ptr<const Impl> impl_;
 };
+
+/// The attempts of an extractor sorted out, with what it has noticed.
+ExtractionResult sortOut(std::vector<ExtractedPatch> attempts,
+                         const PatchExtractor& extractor);
 
 /// Samples seeds and neighbourhoods and fits a patch to each, up to the sampler's
 /// limits.

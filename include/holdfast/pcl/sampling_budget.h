@@ -8,10 +8,11 @@
 
 namespace holdfast {
 
-/// True when the options limit area or time.
+/// True when the options limit the number of patches, the area or the time.
 bool isLimited(const SamplerOptions& options);
 
-/// Watches the limits of area and time while the neighbourhoods of a cloud are visited:
+/// Watches the limits of number, area and time while the neighbourhoods of a cloud are
+/// visited:
 ///
 ///     SamplingBudget budget(sampler.options(), cloud.points->size());
 ///     for (int seed : sampler.seeds()) {
@@ -22,20 +23,33 @@ bool isLimited(const SamplerOptions& options);
 ///     }
 ///
 /// Where neighbourhoods overlap the surface counts once: one with area A of whose n
-/// points m were not covered before adds A m / n. What was visited when the area is
-/// spent depends on the order alone, what was visited when the time is over on the
-/// computer too.
+/// points m were not covered before adds A m / n. When the budget is full depends on
+/// the order of the visits alone, when the time is over on the computer too.
 class SamplingBudget {
 public:
-  /// The time runs from here on. \param points in the cloud.
-  SamplingBudget(const SamplerOptions& options, std::size_t points);
+  using Clock = std::chrono::steady_clock;
 
-  /// Counts a neighbourhood. \param indices of its points, without repetition.
-  /// \param area_m2 of its surface: that of the fitted patch, or without a fit the
-  /// pi r^2 of a whole disc.
+  /// \param points in the cloud. \param start from when on the time runs.
+  SamplingBudget(const SamplerOptions& options,
+                 std::size_t points,
+                 Clock::time_point start = Clock::now());
+
+  /// Counts a patch and its neighbourhood. \param indices of its points, without
+  /// repetition. \param area_m2 of its surface: that of the fitted patch, or without a
+  /// fit the pi r^2 of a whole disc.
   void cover(const std::vector<int>& indices, double area_m2);
 
+  /// Enough patches or area.
+  bool isFull() const;
+
+  /// Full, or no time left.
   bool isSpent() const;
+
+  /// False when only time matters, so that nothing need be covered.
+  bool countsPatches() const
+  {
+    return max_patches_ > 0 || max_area_m2_ > 0.0;
+  }
 
   double coveredArea() const ///< m^2
   {
@@ -43,10 +57,12 @@ public:
   }
 
 private:
+  int max_patches_;
   double max_area_m2_;
   double max_time_s_;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  Clock::time_point start_;
   std::vector<bool> covered_;
+  int patches_ = 0;
   double area_m2_ = 0.0;
 };
 
