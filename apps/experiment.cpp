@@ -1,5 +1,6 @@
 #include "experiment.h"
 
+#include "command_line.h"
 #include "commands.h"
 #include "console.h"
 #include "input_options.h"

@@ -1,6 +1,7 @@
 #include "commands.h"
 #include "console.h"
 #include "fit_settings.h"
+#include "patch_output.h"
 #include "summary.h"
 
 #include <holdfast/io/atomic_file.h>
@@ -9,8 +10,6 @@
 #include <holdfast/pcl/patch_estimation.h>
 
 #include <CLI/CLI.hpp>
-
-#include <unistd.h>
 
 #include <filesystem>
 #include <iostream>
@@ -51,7 +50,7 @@ public:
     if (!settings.json_path.empty() && settings.json_path != "-")
       json_.emplace(settings.json_path);
     if (!settings.output_folder.empty())
-      checkFolder();
+      checkFolder(settings.output_folder);
   }
 
   void write(const PatchReport& report)
@@ -76,20 +75,6 @@ public:
   }
 
 private:
-  /// Says early that a folder cannot be used, but does not create it yet.
-  void checkFolder() const
-  {
-    fs::path existing = fs::absolute(settings_.output_folder);
-    std::error_code ignored;
-    while (!fs::exists(existing, ignored) && existing.has_relative_path())
-      existing = existing.parent_path();
-    if (!fs::is_directory(existing, ignored))
-      throw std::runtime_error(existing.string() + ": is no folder");
-    if (::access(existing.c_str(), W_OK | X_OK) != 0)
-      throw std::runtime_error(existing.string() + ": cannot be written to");
-  }
-
-  /// All files or none.
   void writeFiles(const PatchReport& report)
   {
     const std::string stem = fs::path(report.cloud).stem().string();
@@ -97,21 +82,7 @@ private:
     if (!is_new)
       throw std::runtime_error(report.cloud + ": its results would replace those of " +
                                owner->second);
-    std::error_code error;
-    fs::create_directories(settings_.output_folder, error);
-    if (error)
-      throw std::runtime_error(settings_.output_folder +
-                               ": cannot be created: " + error.message());
-    const fs::path base = fs::path(settings_.output_folder) / stem;
-    AtomicFile json(base.string() + ".patches.json");
-    AtomicFile points(base.string() + ".patches.pcd");
-    AtomicFile mesh(base.string() + ".patches.ply");
-    writeJson(json.stream(), report, JsonLayout::PatchPerLine);
-    writePatchPoints(points.stream(), report.result.patches, report.sensor_pose);
-    writeMesh(mesh.stream(), report.result.patches, false);
-    points.commit();
-    mesh.commit();
-    json.commit();
+    writePatchFiles(report, settings_.output_folder, stem);
   }
 
   const FitSettings& settings_;
@@ -159,7 +130,7 @@ std::vector<std::string>
 neighborhoodNotices(const FitSettings& settings, const RangeCloud& cloud)
 {
   if (settings.whole || cloud.points->height > 1 ||
-      settings.extraction.sampler.neighborhood != Neighborhood::Disc)
+      settings.extraction.options.sampler.neighborhood != Neighborhood::Disc)
     return {};
   return {"not organized: balls take the place of discs"};
 }
@@ -190,7 +161,7 @@ ExtractionResult
 extract(const RangeCloud& cloud, const Sensor& sensor, const FitSettings& settings)
 {
   ProgressBar bar("fitting", !settings.quiet);
-  ExtractionOptions options = settings.extraction;
+  ExtractionOptions options = settings.extraction.options;
   options.progress = [&bar](int done, int total) { bar.update(done, total); };
   return settings.whole ? extractWhole(cloud, sensor, options) :
                           estimatePatches(cloud, sensor, options);
@@ -206,7 +177,7 @@ fitCloud(const std::string& path,
 {
   PatchReport report;
   report.cloud = path;
-  report.options = settings.extraction;
+  report.options = settings.extraction.options;
   report.whole = settings.whole;
 
   const Stopwatch loading;
@@ -237,8 +208,8 @@ fitCloud(const std::string& path,
 int
 runFit(const CLI::App& command, FitSettings& settings)
 {
-  finishFitSettings(command, settings);
-  const Sensor sensor = loadSensorOption(settings.input);
+  finishExtractionOptions(command, settings.extraction);
+  const Sensor sensor = loadSensorOption(settings.input.sensor_name);
   Output output(settings);
   const int exit_code =
       forEachCloud(settings.input.clouds, [&](const std::string& path) {

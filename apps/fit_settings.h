@@ -1,11 +1,9 @@
 /// \file The options of `holdfast fit`.
 #pragma once
 
+#include "extraction_options.h"
 #include "input_options.h"
 
-#include <holdfast/pcl/patch_extraction.h>
-
-#include <cstdint>
 #include <string>
 
 namespace holdfast {
@@ -14,9 +12,7 @@ namespace holdfast {
 struct FitSettings {
   InputOptions input;
   bool whole = false;
-  bool paper = false;
-  /// Complete after finishFitSettings().
-  ExtractionOptions extraction;
+  ExtractionSettings extraction;
   std::string output_folder; ///< empty: no files
   std::string json_path; ///< empty: none; "-": standard output
   bool quiet = false;
@@ -24,9 +20,5 @@ struct FitSettings {
 
 /// Adds the options to the command. `settings` must outlive the parsing.
 void addFitOptions(CLI::App& command, FitSettings& settings);
-
-/// Checks what no single option can see. \throw CLI::ValidationError on combinations
-/// that make no sense.
-void finishFitSettings(const CLI::App& command, FitSettings& settings);
 
 } // namespace holdfast

@@ -1,3 +1,4 @@
+#include "command_line.h"
 #include "commands.h"
 #include "console.h"
 #include "input_options.h"
@@ -199,7 +200,7 @@ factsText(const CloudFacts& facts)
 int
 runInfo(const InfoSettings& settings)
 {
-  const Sensor sensor = loadSensorOption(settings.input);
+  const Sensor sensor = loadSensorOption(settings.input.sensor_name);
   std::optional<AtomicFile> file;
   if (!settings.json_path.empty() && settings.json_path != "-")
     file.emplace(settings.json_path);

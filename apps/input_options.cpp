@@ -1,10 +1,11 @@
 #include "input_options.h"
 
+#include "command_line.h"
+
 #include <holdfast/io/config.h>
 
 #include <CLI/CLI.hpp>
 
-#include <cmath>
 #include <stdexcept>
 
 namespace holdfast {
@@ -21,20 +22,6 @@ joined(const std::vector<std::string>& words)
 
 } // namespace
 
-CLI::Validator
-positiveNumber(const std::string& unit)
-{
-  return CLI::Validator(
-      [](const std::string& text) {
-        double value = 0.0;
-        const bool is_number = CLI::detail::lexical_cast(text, value);
-        return is_number && std::isfinite(value) && value > 0.0 ?
-                   std::string() :
-                   text + " is not a positive number";
-      },
-      unit);
-}
-
 void
 addInputOptions(CLI::App& command, InputOptions& options)
 {
@@ -47,16 +34,22 @@ addInputOptions(CLI::App& command, InputOptions& options)
 }
 
 void
-addSensorOptions(CLI::App& command, InputOptions& options)
+addSensorOption(CLI::App& command, std::string& name)
 {
   command
       .add_option("--sensor",
-                  options.sensor_name,
+                  name,
                   "Sensor that took the cloud, a YAML file or one of: " +
                       joined(listSensors()))
       ->type_name("NAME|FILE")
       ->capture_default_str()
       ->group("Input");
+}
+
+void
+addSensorOptions(CLI::App& command, InputOptions& options)
+{
+  addSensorOption(command, options.sensor_name);
   command
       .add_option_function<double>(
           "--depth-scale",
@@ -73,10 +66,10 @@ addSensorOptions(CLI::App& command, InputOptions& options)
 }
 
 Sensor
-loadSensorOption(const InputOptions& options)
+loadSensorOption(const std::string& name)
 {
   try {
-    return loadSensor(options.sensor_name);
+    return loadSensor(name);
   }
   catch (const std::runtime_error& error) {
     throw CLI::ValidationError("--sensor", error.what());
@@ -102,21 +95,6 @@ inputNotices(const InputOptions& options, const CloudFileInfo& info)
   if (options.depth_scale_given && !is_depth_image)
     notices.emplace_back("no depth image: --depth-scale does not apply");
   return notices;
-}
-
-void
-tidyHelp(CLI::App& command)
-{
-  for (CLI::Option* option : command.get_options()) {
-    // CLI11 writes TYPE:CHECK; the type is empty where the check says it all.
-    std::string text = option->get_type_name();
-    if (!text.empty() && text[0] == ':')
-      text.erase(0, 1);
-    if (!option->get_default_str().empty())
-      text += " [" + option->get_default_str() + "]";
-    if (!option->get_positional())
-      option->option_text(text);
-  }
 }
 
 } // namespace holdfast

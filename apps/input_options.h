@@ -21,23 +21,19 @@ struct InputOptions {
 /// Adds CLOUD..., --sensor and --depth-scale. `options` must outlive the parsing.
 void addInputOptions(CLI::App& command, InputOptions& options);
 
-/// Adds --sensor and --depth-scale alone.
+/// Adds --sensor and --depth-scale.
 void addSensorOptions(CLI::App& command, InputOptions& options);
 
+/// Adds --sensor alone. `name` must outlive the parsing.
+void addSensorOption(CLI::App& command, std::string& name);
+
 /// \throw CLI::ValidationError when there is no such sensor.
-Sensor loadSensorOption(const InputOptions& options);
+Sensor loadSensorOption(const std::string& name);
 
 LoadOptions loadOptions(const InputOptions& options, const Sensor& sensor);
 
 /// What the user should know about the file and how it was read, one line each.
 std::vector<std::string> inputNotices(const InputOptions& options,
                                       const CloudFileInfo& info);
-
-/// Accepts positive finite numbers; `unit` is shown in the help.
-CLI::Validator positiveNumber(const std::string& unit);
-
-/// Shortens what the help says behind each option to "VALUES [DEFAULT]". To be called
-/// when all options are there.
-void tidyHelp(CLI::App& command);
 
 } // namespace holdfast

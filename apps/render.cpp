@@ -164,7 +164,7 @@ loadSubject(const std::string& result, const RenderSettings& settings)
   const PatchReport report = readResult(result);
   const std::string path =
       settings.cloud.empty() ? findCloud(result, report.cloud) : settings.cloud;
-  const Sensor sensor = loadSensorOption(settings.input);
+  const Sensor sensor = loadSensorOption(settings.input.sensor_name);
   CloudFileInfo info;
   const RangeCloud cloud = loadCloud(path, loadOptions(settings.input, sensor), &info);
 

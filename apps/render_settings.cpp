@@ -1,5 +1,7 @@
 #include "render_settings.h"
 
+#include "command_line.h"
+
 #include <CLI/CLI.hpp>
 
 #include <cmath>

@@ -1,0 +1,233 @@
+#include "extraction_options.h"
+
+#include "command_line.h"
+
+#include <CLI/CLI.hpp>
+
+namespace holdfast {
+namespace {
+
+const Choices<SurfaceRequest> kSurfaces{
+    {"auto", SurfaceRequest::Auto},
+    {"paraboloid", SurfaceRequest::Paraboloid},
+    {"plane", SurfaceRequest::Plane},
+    {"sphere", SurfaceRequest::Sphere},
+    {"cylinder", SurfaceRequest::CircularCylinder},
+    {"elliptic-paraboloid", SurfaceRequest::EllipticParaboloid},
+    {"hyperbolic-paraboloid", SurfaceRequest::HyperbolicParaboloid},
+    {"cylindric-paraboloid", SurfaceRequest::CylindricParaboloid},
+    {"circular-paraboloid", SurfaceRequest::CircularParaboloid}};
+
+const Choices<BoundaryType> kBoundaries{{"ellipse", BoundaryType::Ellipse},
+                                        {"circle", BoundaryType::Circle},
+                                        {"rectangle", BoundaryType::Rectangle},
+                                        {"quad", BoundaryType::Quad}};
+
+const Choices<Neighborhood> kNeighborhoods{{"disc", Neighborhood::Disc},
+                                           {"ball", Neighborhood::Ball},
+                                           {"geodesic", Neighborhood::Geodesic},
+                                           {"knn", Neighborhood::Knn}};
+
+const Choices<CovarianceMode> kCovarianceModes{
+    {"exact", CovarianceMode::Exact},
+    {"gauss-newton", CovarianceMode::GaussNewton},
+    {"second-order", CovarianceMode::SecondOrder},
+    {"stagewise", CovarianceMode::Stagewise},
+    {"monte-carlo", CovarianceMode::MonteCarlo}};
+
+const Choices<Residual> kResiduals{{"sampson", Residual::Sampson},
+                                   {"ray", Residual::Ray}};
+
+void
+addPatchOptions(CLI::App& command, ExtractionSettings& settings)
+{
+  const std::string group = "Patches";
+  FitOptions& fit = settings.options.fit;
+  addChoice(command,
+            "--surface",
+            fit.surface,
+            kSurfaces,
+            "Surface to fit; auto: a paraboloid whose kind, or flatness, the points "
+            "decide; paraboloid: the same, but never a plane")
+      ->default_str("auto")
+      ->group(group);
+  addChoice(command,
+            "--boundary",
+            fit.plane_boundary,
+            kBoundaries,
+            "Boundary of planes; other surfaces imply theirs (default: ellipse)")
+      ->group(group);
+  command
+      .add_option("--containment",
+                  fit.containment,
+                  "Share of the points the boundary encloses per axis, between 0 and 1")
+      ->type_name("SHARE")
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--curvature-tolerance",
+                  fit.curvature_tolerance_per_m,
+                  "Curvatures below it count as zero, 1/metre")
+      ->type_name("PER_M")
+      ->capture_default_str()
+      ->group(group);
+  addChoice(command,
+            "--residual",
+            fit.residual,
+            kResiduals,
+            "Distance to minimise: first order, or exact along the noise")
+      ->default_str("ray")
+      ->group(group);
+  command
+      .add_flag(
+          "--paper",
+          settings.paper,
+          "The choices of Kanoulas, Tsagarakis and Vona 2016 wherever ours differ")
+      ->group(group);
+  addChoice(command,
+            "--covariance",
+            settings.options.covariance,
+            kCovarianceModes,
+            "Covariance of the parameters: exact to first order; its Gauss-Newton "
+            "approximation; with second-order terms; the paper's chain of stages; or "
+            "1000 refits to resampled points")
+      ->default_str("exact")
+      ->group(group);
+}
+
+void
+addNeighborhoodOptions(CLI::App& command, SamplerOptions& sampler)
+{
+  const std::string group = "Seeds and neighbourhoods";
+  command
+      .add_option("--radius", sampler.radius_m, "Radius of the neighbourhoods, metres")
+      ->check(positiveNumber("M"))
+      ->type_name("")
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--max-patches",
+                  sampler.max_patches,
+                  "Stop after so many patches, those turned down not counted")
+      ->check(CLI::Range(1, 100000000, "N"))
+      ->type_name("")
+      ->group(group);
+  command
+      .add_option("--max-area",
+                  sampler.max_area_m2,
+                  "Stop when the patches cover this much surface together, square "
+                  "metres; what lies in several counts once")
+      ->check(positiveNumber("M2"))
+      ->type_name("")
+      ->group(group);
+  addChoice(
+      command,
+      "--neighborhood",
+      sampler.neighborhood,
+      kNeighborhoods,
+      "Points around a seed: pixels within the image of the radius, points within "
+      "it, the same along the surface, or the --k nearest")
+      ->default_str("disc")
+      ->group(group);
+  command.add_option("--k", sampler.k, "Points of a knn neighbourhood")
+      ->check(CLI::Range(3, 100000000, "N"))
+      ->type_name("")
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--random-seed",
+                  sampler.random_seed,
+                  "Start of the random numbers; the grid draws none")
+      ->check(CLI::Validator(CLI::NonNegativeNumber).description("N"))
+      ->type_name("")
+      ->capture_default_str()
+      ->group(group);
+}
+
+void
+addValidationOptions(CLI::App& command, ValidationOptions& limits)
+{
+  const std::string group = "Validation";
+  const auto add = [&](const std::string& name,
+                       std::optional<double>& limit,
+                       const CLI::Validator& valid,
+                       const std::string& description) {
+    command
+        .add_option_function<double>(
+            name,
+            [&limit](double value) { limit = value; },
+            description)
+        ->check(valid)
+        ->type_name("")
+        ->group(group);
+  };
+  add("--max-curvature",
+      limits.max_curvature_per_m,
+      positiveNumber("PER_M"),
+      "Turn down patches with a larger principal curvature, 1/metre");
+  add("--max-residual",
+      limits.max_residual_m,
+      positiveNumber("M"),
+      "Turn down patches with a larger rms distance of their points from the surface, "
+      "metres");
+  add("--min-coverage",
+      limits.min_coverage,
+      CLI::Range(0.0, 1.0, "SHARE"),
+      "Turn down patches of which points support a smaller share, 0 to 1");
+  add("--max-chi2",
+      limits.max_chi2_per_dof,
+      positiveNumber("RATIO"),
+      "Turn down patches with a larger chi-square per degree of freedom");
+}
+
+} // namespace
+
+void
+addExtractionOptions(CLI::App& command, ExtractionSettings& settings)
+{
+  addPatchOptions(command, settings);
+  addNeighborhoodOptions(command, settings.options.sampler);
+  addValidationOptions(command, settings.options.validation.emplace());
+  command
+      .add_option("--threads",
+                  settings.options.threads,
+                  "Threads to use, 0: all cores; results do not depend on it")
+      ->check(CLI::Range(0, 4096, "N"))
+      ->type_name("")
+      ->capture_default_str()
+      ->group("Patches");
+  exclude(command, "--paper", {"--residual"});
+}
+
+void
+finishExtractionOptions(const CLI::App& command, ExtractionSettings& settings)
+{
+  FitOptions& fit = settings.options.fit;
+  if (settings.paper) {
+    FitOptions paper = FitOptions::paper();
+    paper.surface = fit.surface;
+    paper.plane_boundary = fit.plane_boundary;
+    if (command.count("--containment") > 0)
+      paper.containment = fit.containment;
+    if (command.count("--curvature-tolerance") > 0)
+      paper.curvature_tolerance_per_m = fit.curvature_tolerance_per_m;
+    fit = paper;
+  }
+  const SamplerOptions& sampler = settings.options.sampler;
+  const bool knn = sampler.neighborhood == Neighborhood::Knn;
+  if (command.count("--k") > 0 && !knn)
+    throw CLI::ValidationError("--k", "needs --neighborhood knn");
+  if (command.count("--radius") > 0 && knn)
+    throw CLI::ValidationError("--radius", "does not go with --neighborhood knn");
+  if (fit.plane_boundary && fit.surface != SurfaceRequest::Auto &&
+      fit.surface != SurfaceRequest::Plane)
+    throw CLI::ValidationError("--boundary", "goes with --surface plane or auto only");
+  if (!(fit.containment > 0.0 && fit.containment < 1.0))
+    throw CLI::ValidationError("--containment", "must lie between 0 and 1");
+  if (!(fit.curvature_tolerance_per_m >= 0.0))
+    throw CLI::ValidationError("--curvature-tolerance", "must not be negative");
+  if (const std::string error = validityError(fit); !error.empty())
+    throw CLI::ValidationError("fit", error);
+}
+
+} // namespace holdfast

@@ -1,0 +1,24 @@
+/// \file The options that say which patches are wanted and how they are fitted.
+#pragma once
+
+#include <holdfast/pcl/patch_extraction.h>
+
+#include <CLI/App.hpp>
+
+namespace holdfast {
+
+struct ExtractionSettings {
+  /// Complete after finishExtractionOptions().
+  ExtractionOptions options;
+  bool paper = false;
+};
+
+/// Adds surfaces, neighbourhoods, validation and threads. `settings` must outlive the
+/// parsing.
+void addExtractionOptions(CLI::App& command, ExtractionSettings& settings);
+
+/// Checks what no single option can see. \throw CLI::ValidationError on combinations
+/// that make no sense.
+void finishExtractionOptions(const CLI::App& command, ExtractionSettings& settings);
+
+} // namespace holdfast
