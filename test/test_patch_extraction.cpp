@@ -267,10 +267,10 @@ TEST(ExtractPatches, StopsWhenTheTimeIsOver)
 {
   Random random;
   ExtractionOptions options = makeOptions(0.08, 0.01);
-  options.sampler.max_time_s = 1e-12; // over before the second look
+  options.sampler.max_time_s = 1e-12; // over before the first fit
   const ExtractionResult result =
       extractPatches(makeRollingCloud(random), makeSensor(kCamera), options);
-  EXPECT_LE(result.patches.size(), 32U);
+  EXPECT_TRUE(result.patches.empty());
   EXPECT_EQ(result.notices.size(), 1U);
 }
 

@@ -11,6 +11,7 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <exception>
 #include <mutex>
@@ -117,10 +118,6 @@ checkedThreads(int threads)
   return threads > 0 ? threads : omp_get_max_threads();
 }
 
-/// Fits between two looks at the limits, a few milliseconds' worth. The same for any
-/// number of threads, since the result must be.
-constexpr std::size_t kFitsPerLook = 32;
-
 /// Tells the caller how far the work is, from one thread at a time, never backwards.
 class ProgressReport {
 public:
@@ -154,7 +151,8 @@ void
 parallelFor(int n, int threads, Work&& work)
 {
   std::exception_ptr error;
-#pragma omp parallel for schedule(dynamic, 16) num_threads(threads)
+  // One at a time, in order: who stops early then has the first ones.
+#pragma omp parallel for schedule(dynamic, 1) num_threads(threads)
   for (int i = 0; i < n; ++i) {
     try {
       work(i, omp_get_thread_num());
@@ -168,6 +166,42 @@ parallelFor(int n, int threads, Work&& work)
   if (error)
     std::rethrow_exception(error);
 }
+
+/// Looks at attempts in the order of their seeds, in whatever order the threads come to
+/// an end with them, so that what is looked at does not depend on the threads.
+class InOrder {
+public:
+  /// \param look at an attempt; true when it was the last that is wanted.
+  InOrder(std::size_t attempts, std::function<bool(std::size_t)> look)
+  : is_done_(attempts, false), look_(std::move(look))
+  {}
+
+  void finish(int attempt)
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    is_done_[static_cast<std::size_t>(attempt)] = true;
+    while (!over_ && seen_ < is_done_.size() && is_done_[seen_])
+      over_ = look_(seen_++);
+  }
+
+  bool isOver() const
+  {
+    return over_;
+  }
+
+  /// How many were looked at, when the threads are done.
+  std::size_t seen() const
+  {
+    return seen_;
+  }
+
+private:
+  std::mutex mutex_;
+  std::vector<bool> is_done_;
+  std::function<bool(std::size_t)> look_;
+  std::size_t seen_ = 0;
+  std::atomic<bool> over_{false};
+};
 
 } // namespace
 
@@ -190,15 +224,12 @@ struct PatchExtractor::Impl {
                          const Eigen::Vector3d& origin,
                          PointBatch& batch) const;
 
-  std::vector<ExtractedPatch> fitAround(const std::vector<Seed>& seeds,
-                                        const NeighborhoodSearch& search,
-                                        ProgressReport& progress) const;
-
-  /// Moves attempts over one by one, as long as the budget is not full.
-  static void keepUntilFull(std::vector<ExtractedPatch> some,
-                            const NeighborhoodSearch& search,
-                            SamplingBudget& budget,
-                            std::vector<ExtractedPatch>& attempts);
+  /// Fills attempts[i] and calls done(i), for every seed unless skip().
+  void fitAround(const std::vector<Seed>& seeds,
+                 const NeighborhoodSearch& search,
+                 const std::function<bool()>& skip,
+                 const std::function<void(int)>& done,
+                 std::vector<ExtractedPatch>& attempts) const;
 
   std::vector<Seed> places(const std::vector<int>& indices) const;
 
@@ -230,18 +261,22 @@ PatchExtractor::Impl::attempt(const std::vector<int>& indices,
   return patch;
 }
 
-std::vector<ExtractedPatch>
+void
 PatchExtractor::Impl::fitAround(const std::vector<Seed>& seeds,
                                 const NeighborhoodSearch& search,
-                                ProgressReport& report) const
+                                const std::function<bool()>& skip,
+                                const std::function<void(int)>& done,
+                                std::vector<ExtractedPatch>& attempts) const
 {
   struct Workspace {
     std::vector<int> indices;
     PointBatch batch;
   };
   std::vector<Workspace> workspaces(static_cast<std::size_t>(threads));
-  std::vector<ExtractedPatch> attempts(seeds.size());
+  ProgressReport report(progress, static_cast<int>(seeds.size()));
   parallelFor(static_cast<int>(seeds.size()), threads, [&](int i, int thread) {
+    if (skip())
+      return;
     const Seed& seed = seeds[i];
     Workspace& work = workspaces[thread];
     search(seed, thread, work.indices);
@@ -249,27 +284,9 @@ PatchExtractor::Impl::fitAround(const std::vector<Seed>& seeds,
     attempts[i].seed_index = seed.index;
     attempts[i].seed = seed.position;
     attempts[i].radius_m = radius_m;
+    done(i);
     report.oneDone();
   });
-  return attempts;
-}
-
-void
-PatchExtractor::Impl::keepUntilFull(std::vector<ExtractedPatch> some,
-                                    const NeighborhoodSearch& search,
-                                    SamplingBudget& budget,
-                                    std::vector<ExtractedPatch>& attempts)
-{
-  std::vector<int> indices;
-  for (ExtractedPatch& patch : some) {
-    if (budget.isFull())
-      return;
-    if (isAccepted(patch) && budget.countsPatches()) {
-      search({*patch.seed_index, patch.seed}, 0, indices);
-      budget.cover(indices, projectedArea(patch.fit.patch));
-    }
-    attempts.push_back(std::move(patch));
-  }
 }
 
 std::vector<Seed>
@@ -305,8 +322,14 @@ std::vector<ExtractedPatch>
 PatchExtractor::fitAround(const std::vector<Seed>& seeds,
                           const NeighborhoodSearch& search) const
 {
-  ProgressReport progress(impl_->progress, static_cast<int>(seeds.size()));
-  return impl_->fitAround(seeds, search, progress);
+  std::vector<ExtractedPatch> attempts(seeds.size());
+  impl_->fitAround(
+      seeds,
+      search,
+      [] { return false; },
+      [](int) {},
+      attempts);
+  return attempts;
 }
 
 std::vector<ExtractedPatch>
@@ -323,19 +346,25 @@ PatchExtractor::fitWithinLimits(const std::vector<int>& seeds,
 {
   if (!isLimited(sampler.options()))
     return fitAround(seeds, sampler);
-  SamplingBudget budget(sampler.options(), impl_->cloud.points->size(), impl_->start);
   const std::vector<Seed> places = impl_->places(seeds);
-  const NeighborhoodSearch search = impl_->searchOf(sampler);
-  ProgressReport progress(impl_->progress, static_cast<int>(seeds.size()));
-  std::vector<ExtractedPatch> attempts;
-  while (attempts.size() < places.size() && !budget.isSpent()) {
-    const auto next = places.begin() + static_cast<std::ptrdiff_t>(attempts.size());
-    const auto end = next + std::min<std::ptrdiff_t>(kFitsPerLook, places.end() - next);
-    impl_->keepUntilFull(impl_->fitAround({next, end}, search, progress),
-                         search,
-                         budget,
-                         attempts);
-  }
+  std::vector<ExtractedPatch> attempts(seeds.size());
+  SamplingBudget budget(sampler.options(), impl_->cloud.points->size(), impl_->start);
+  const NeighborhoodSearch search_again = impl_->searchOf(sampler);
+  std::vector<int> indices;
+  InOrder count(seeds.size(), [&](std::size_t i) {
+    if (isAccepted(attempts[i]) && budget.countsPatches()) {
+      search_again(places[i], 0, indices);
+      budget.cover(indices, projectedArea(attempts[i].fit.patch));
+    }
+    return budget.isFull();
+  });
+  impl_->fitAround(
+      places,
+      impl_->searchOf(sampler),
+      [&] { return count.isOver() || budget.isOutOfTime(); },
+      [&](int i) { count.finish(i); },
+      attempts);
+  attempts.resize(count.seen());
   if (notice && attempts.size() < seeds.size())
     *notice = "stopped at the limit of patches, area or time after " +
               std::to_string(attempts.size()) + " of " + std::to_string(seeds.size()) +

@@ -42,10 +42,8 @@ SamplingBudget::isFull() const
 }
 
 bool
-SamplingBudget::isSpent() const
+SamplingBudget::isOutOfTime() const
 {
-  if (isFull())
-    return true;
   const std::chrono::duration<double> elapsed = Clock::now() - start_;
   return max_time_s_ > 0.0 && elapsed.count() >= max_time_s_;
 }

@@ -95,7 +95,7 @@ public:
 
   /// The same with the first of the seeds, until the limits that the options of the
   /// sampler set to patches, area or time are reached. Only accepted patches count; the
-  /// time runs from the construction of this object and is looked at every few fits.
+  /// time runs from the construction of this object.
   /// \param notice is set when seeds were left.
   std::vector<ExtractedPatch> fitWithinLimits(const std::vector<int>& seeds,
                                               const NeighborhoodSampler& sampler,

@@ -42,8 +42,12 @@ public:
   /// Enough patches or area.
   bool isFull() const;
 
-  /// Full, or no time left.
-  bool isSpent() const;
+  bool isOutOfTime() const;
+
+  bool isSpent() const
+  {
+    return isFull() || isOutOfTime();
+  }
 
   /// False when only time matters, so that nothing need be covered.
   bool countsPatches() const
