@@ -11,10 +11,15 @@
 
 namespace holdfast {
 
+void addCalibrateCommand(CLI::App& app, int& exit_code);
 void addExperimentCommand(CLI::App& app, int& exit_code);
 void addFitCommand(CLI::App& app, int& exit_code);
 void addInfoCommand(CLI::App& app, int& exit_code);
 void addRenderCommand(CLI::App& app, int& exit_code);
 void addSimulateCommand(CLI::App& app, int& exit_code);
+
+// With OpenNI2 only; in live/.
+void addLiveCommand(CLI::App& app, int& exit_code);
+void addRecordCommand(CLI::App& app, int& exit_code);
 
 } // namespace holdfast

@@ -16,10 +16,12 @@ constexpr const char* kExamples = R"(Examples:
   holdfast info rocks.pcd                   what is in a cloud
   holdfast fit rocks.pcd                    patches all over it, as a table
   holdfast fit rocks.pcd -o results         and as JSON and a coloured mesh
+  holdfast live                             patches of a depth camera, as they come
   holdfast render results/rocks.patches.json -o rocks.png
                                             and as a picture
   holdfast fit can.pcd --whole --surface cylinder --json -
                                             one patch to all points, as JSON
+  holdfast calibrate frames/ -o mine.yaml   how large is my camera's noise?
   holdfast experiment table1                are the covariances right?
 
 'holdfast COMMAND --help' explains a command.
@@ -47,7 +49,12 @@ run(int argc, char** argv)
   int exit_code = 0;
   holdfast::addFitCommand(app, exit_code);
   holdfast::addInfoCommand(app, exit_code);
+#ifdef HOLDFAST_HAVE_OPENNI2
+  holdfast::addLiveCommand(app, exit_code);
+  holdfast::addRecordCommand(app, exit_code);
+#endif
   holdfast::addRenderCommand(app, exit_code);
+  holdfast::addCalibrateCommand(app, exit_code);
   holdfast::addSimulateCommand(app, exit_code);
   holdfast::addExperimentCommand(app, exit_code);
   try {

@@ -8,6 +8,8 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -178,6 +180,90 @@ TEST_F(SensorFile, BrokenYamlNamesTheLine)
   EXPECT_NE(complaint(), "");
   write("name: a\n\tcamera: 5\n");
   EXPECT_EQ(complaint().rfind("2: ", 0), 0u) << complaint();
+}
+
+TEST_F(SensorFile, SavedSensorsComeBackToTheLastDigit)
+{
+  write(kGood);
+  Sensor sensor = loadSensor(file_);
+  sensor.camera.fx = 525.0 / 7.0;
+  sensor.max_range_m = 1e3;
+  for (const std::string name : {"mine", "yes", "17", "a: b", "it's #1"}) {
+    sensor.name = name;
+    saveSensor(file_,
+               sensor,
+               {{"sigma_point_px", 0.1 + 0.2},
+                {"sigma_disparity_px", 1e-17},
+                {"baseline_m", 0.06},
+                {"focal_px", 310.0}});
+    const Sensor back = loadSensor(file_);
+    EXPECT_EQ(back.name, name);
+    EXPECT_EQ(back.camera.width, 320);
+    EXPECT_EQ(back.camera.height, 240);
+    EXPECT_EQ(back.camera.fx, sensor.camera.fx);
+    EXPECT_EQ(back.camera.cy, 119.5);
+    EXPECT_EQ(back.min_range_m, 0.4);
+    EXPECT_EQ(back.max_range_m, 1e3);
+    EXPECT_EQ(back.baseline_m, 0.06);
+    EXPECT_EQ(back.disparity_focal_px, 310.0);
+    EXPECT_EQ(back.disparity_quantum_px, 0.25);
+    const auto& noise = dynamic_cast<const StereoNoiseModel&>(*back.noise);
+    EXPECT_EQ(noise.parameters().sigma_point_px, 0.1 + 0.2);
+    EXPECT_EQ(noise.parameters().sigma_disparity_px, 1e-17);
+  }
+  sensor.disparity_quantum_px = 0.0;
+  sensor.noise = makeNoiseModel("constant", {{"sigma_m", 0.002}});
+  saveSensor(file_, sensor, {{"sigma_m", 0.002}});
+  EXPECT_EQ(loadSensor(file_).disparity_quantum_px, 0.0);
+  EXPECT_EQ(loadSensor(file_).noise->name(), "constant");
+}
+
+TEST_F(SensorFile, CommentsStandAboveTheirKeys)
+{
+  const Sensor sensor = loadSensor("realsense_d435");
+  const NoiseParameters noise{{"sigma_point_px", 0.35},
+                              {"sigma_disparity_px", 0.08},
+                              {"baseline_m", 0.05},
+                              {"focal_px", 446.8}};
+  std::string long_text = "Measured";
+  for (int i = 0; i < 40; ++i)
+    long_text += " and measured";
+  saveSensor(file_,
+             sensor,
+             noise,
+             {{"", "One of ours."},
+              {"camera.fx", "Wide: # and \"quotes\" do no harm."},
+              {"range", "From the data sheet."},
+              {"noise.sigma_disparity_px", long_text}});
+  std::ifstream in(file_);
+  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  EXPECT_EQ(text.rfind("# One of ours.\nname: realsense_d435\n", 0), 0u) << text;
+  EXPECT_NE(text.find("  # Wide: # and \"quotes\" do no harm.\n  fx: 446.8\n"),
+            std::string::npos)
+      << text;
+  EXPECT_NE(text.find("\n# From the data sheet.\nrange:\n"), std::string::npos) << text;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);)
+    EXPECT_LE(line.size(), 88u) << line;
+  EXPECT_EQ(loadSensor(file_).camera.fx, 446.8);
+}
+
+TEST_F(SensorFile, WhatCannotBeSavedLeavesTheOldFile)
+{
+  write(kGood);
+  const Sensor sensor = loadSensor(file_);
+  const NoiseParameters noise{{"sigma_point_px", 0.35},
+                              {"sigma_disparity_px", 0.08},
+                              {"baseline_m", 0.05},
+                              {"focal_px", 446.8}};
+  EXPECT_THROW(saveSensor(file_, sensor, {{"sigma_m", 1.0}}), std::invalid_argument);
+  EXPECT_THROW(saveSensor(file_, sensor, noise, {{"camera.fz", "depth"}}),
+               std::invalid_argument);
+  EXPECT_THROW(saveSensor((folder_ / "none" / "a.yaml").string(), sensor, noise),
+               std::runtime_error);
+  EXPECT_EQ(loadSensor(file_).camera.fx, 300.5);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()),
+            1);
 }
 
 TEST(BuiltInSensors, AllLoadUnderTheirNames)

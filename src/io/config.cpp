@@ -1,3 +1,4 @@
+#include <holdfast/io/atomic_file.h>
 #include <holdfast/io/config.h>
 #include <holdfast/sensor/noise_registry.h>
 #include <holdfast/sensor/parameter_error.h>
@@ -5,11 +6,14 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <array>
+#include <charconv>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
 #include <set>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 
@@ -223,6 +227,111 @@ readSensor(const YAML::Node& node, const std::string& file)
   return sensor;
 }
 
+/// The shortest text that reads back as this number.
+std::string
+numberText(double value)
+{
+  std::array<char, 32> text;
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), value);
+  return {text.data(), end.ptr};
+}
+
+/// Writes the maps of a sensor file, each key below its comment.
+class SectionWriter {
+public:
+  SectionWriter(std::ostream& out, SensorComments comments)
+  : out_(out), comments_(std::move(comments))
+  {
+    writeComment("", "");
+  }
+
+  void begin(const std::string& section)
+  {
+    out_ << '\n';
+    writeComment(section, "");
+    out_ << section << ":\n";
+    section_ = section + ".";
+  }
+
+  void entry(const std::string& key, const std::string& value)
+  {
+    const std::string indent = section_.empty() ? "" : "  ";
+    writeComment(section_ + key, indent);
+    out_ << indent << key << ": " << value << '\n';
+  }
+
+  void entry(const std::string& key, double value)
+  {
+    entry(key, numberText(value));
+  }
+
+  /// \throw std::invalid_argument when a comment was left over.
+  void finish() const
+  {
+    if (!comments_.empty())
+      throw std::invalid_argument("comment on " + comments_.begin()->first +
+                                  ", which the sensor file does not have");
+  }
+
+private:
+  void writeComment(const std::string& key, const std::string& indent)
+  {
+    constexpr std::size_t kWidth = 88;
+    const auto comment = comments_.extract(key);
+    if (comment.empty())
+      return;
+    std::istringstream words(comment.mapped());
+    std::string line = indent + "#", word;
+    while (words >> word) {
+      if (line.size() + 1 + word.size() > kWidth) {
+        out_ << line << '\n';
+        line = indent + "#";
+      }
+      line += " " + word;
+    }
+    out_ << line << '\n';
+  }
+
+  std::ostream& out_;
+  SensorComments comments_; ///< those not yet written
+  std::string section_;
+};
+
+/// Quoted where YAML would take the word for something else.
+std::string
+yamlText(const std::string& word)
+{
+  YAML::Emitter emitter;
+  emitter << word;
+  return emitter.c_str();
+}
+
+void
+writeSensor(SectionWriter& out, const Sensor& sensor, const NoiseParameters& noise)
+{
+  out.entry("name", yamlText(sensor.name));
+  out.begin("camera");
+  out.entry("width", sensor.camera.width);
+  out.entry("height", sensor.camera.height);
+  out.entry("fx", sensor.camera.fx);
+  out.entry("fy", sensor.camera.fy);
+  out.entry("cx", sensor.camera.cx);
+  out.entry("cy", sensor.camera.cy);
+  out.begin("range");
+  out.entry("min_m", sensor.min_range_m);
+  out.entry("max_m", sensor.max_range_m);
+  out.begin("disparity");
+  out.entry("baseline_m", sensor.baseline_m);
+  out.entry("focal_px", sensor.disparity_focal_px);
+  if (sensor.disparity_quantum_px > 0.0)
+    out.entry("quantum_px", sensor.disparity_quantum_px);
+  out.begin("noise");
+  out.entry("model", sensor.noise->name());
+  for (const auto& [name, value] : noise)
+    out.entry(name, value);
+  out.finish();
+}
+
 /// The folders of built-in sensors, the most specific first.
 std::vector<fs::path>
 sensorFolders()
@@ -273,6 +382,19 @@ loadSensor(const std::string& name_or_path)
     throw std::runtime_error(file + ":" + std::to_string(lineOf(error.mark)) + ": " +
                              error.msg);
   }
+}
+
+void
+saveSensor(const std::string& path,
+           const Sensor& sensor,
+           const NoiseParameters& noise,
+           const SensorComments& comments)
+{
+  makeNoiseModel(sensor.noise->name(), noise); // throws when they do not match
+  AtomicFile file(path);
+  SectionWriter out(file.stream(), comments);
+  writeSensor(out, sensor, noise);
+  file.commit();
 }
 
 std::vector<std::string>

@@ -197,23 +197,26 @@ PointGatherer::evaluateModel(PointBatch& batch) const
     rotate(cloud_.sensor_pose.R, n, s);
 }
 
-bool
-PointGatherer::isUsable(int index) const
-{
-  const std::size_t i = static_cast<std::size_t>(index);
-  if (!stored_.empty())
-    return isCovariance(stored_[i].cast<double>());
-  const Eigen::Vector3d axis = cloud_.sensor_pose.R.col(2);
-  return noise_->isOmnidirectional() ||
-         axis.dot(position(cloud_, i) - cloud_.sensor_pose.c) > 0.0;
-}
-
 int
 PointGatherer::countInvalidCovariances() const
 {
+  if (stored_.empty())
+    return noise_->isOmnidirectional() ? 0 : countBehindCamera();
   int count = 0;
-  for (int i = 0; i < static_cast<int>(cloud_.points->size()); ++i)
-    count += pcl::isFinite((*cloud_.points)[i]) && !isUsable(i);
+  for (std::size_t i = 0; i < stored_.size(); ++i)
+    count += pcl::isFinite((*cloud_.points)[i]) &&
+             !isCovariance(stored_[i].cast<double>());
+  return count;
+}
+
+int
+PointGatherer::countBehindCamera() const
+{
+  const Eigen::Vector3f axis = cloud_.sensor_pose.R.col(2).cast<float>();
+  const Eigen::Vector3f centre = cloud_.sensor_pose.c.cast<float>();
+  int count = 0;
+  for (const pcl::PointXYZ& p : *cloud_.points)
+    count += pcl::isFinite(p) && !(axis.dot(p.getVector3fMap() - centre) > 0.0F);
   return count;
 }
 

@@ -31,7 +31,7 @@ private:
   void gatherStored(const std::vector<int>& indices, PointBatch& batch) const;
   void gatherModelled(const std::vector<int>& indices, PointBatch& batch) const;
   void evaluateModel(PointBatch& batch) const;
-  bool isUsable(int index) const;
+  int countBehindCamera() const;
 
   const RangeCloud& cloud_;
   NoiseModel::ConstPtr noise_;

@@ -1,8 +1,10 @@
 /// \file Sensors from YAML files.
 #pragma once
 
+#include <holdfast/sensor/noise_registry.h>
 #include <holdfast/sensor/sensor.h>
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -18,6 +20,22 @@ namespace holdfast {
 /// sensor, the file is no YAML, a key is missing, unknown or given twice, or a value
 /// has the wrong type or makes no sense.
 Sensor loadSensor(const std::string& name_or_path);
+
+/// Comments of a sensor file: the text above a key by its name, such as "camera.fx";
+/// the one without a name opens the file. Long lines are broken between words.
+using SensorComments = std::map<std::string, std::string>;
+
+/// Writes a file from which loadSensor() makes the same sensor, to the last digit.
+///
+/// \param noise the parameters that sensor.noise was made from, which it does not tell.
+/// \throw std::invalid_argument when they do not suit its model, or a comment has no
+/// key to stand above.
+/// \throw std::runtime_error when the file cannot be written; then there is none, or
+/// the one from before.
+void saveSensor(const std::string& path,
+                const Sensor& sensor,
+                const NoiseParameters& noise,
+                const SensorComments& comments = {});
 
 /// Names of the built-in sensors, sorted.
 std::vector<std::string> listSensors();

@@ -1,0 +1,215 @@
+#include <holdfast/io/cloud_io.h>
+#include <holdfast/io/config.h>
+#include <holdfast/sensor/stereo_noise_model.h>
+
+#include "support/organized_cloud.h"
+#include "support/run_program.h"
+#include "support/small_clouds.h"
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <cmath>
+
+namespace holdfast { namespace {
+
+using Json = nlohmann::json;
+using Names = std::vector<std::string>;
+using test::ProgramRun;
+
+bool
+contains(const Json& estimate, double value)
+{
+  return estimate.at("interval").at(0) <= value &&
+         estimate.at("interval").at(1) >= value;
+}
+
+class CalibrateProgram : public testing::Test {
+protected:
+  CalibrateProgram()
+  : folder_(test::freshFolder(
+        std::string("calibrate_") +
+        testing::UnitTest::GetInstance()->current_test_info()->name()))
+  {}
+
+  ProgramRun calibrate(Names arguments) const
+  {
+    arguments.insert(arguments.begin(), "calibrate");
+    return test::runProgram(folder_, arguments);
+  }
+
+  /// Frames of a table as a Kinect sees it.
+  Names simulate(int frames) const
+  {
+    Names paths;
+    for (int i = 1; i <= frames; ++i) {
+      paths.push_back(folder_ + "/frame" + std::to_string(i) + ".pcd");
+      const ProgramRun run = test::runProgram(folder_,
+                                              {"simulate",
+                                               "table",
+                                               "-o",
+                                               paths.back(),
+                                               "--quantize",
+                                               "--random-seed",
+                                               std::to_string(i)});
+      EXPECT_EQ(run.exit_code, 0) << run.err;
+    }
+    return paths;
+  }
+
+  /// Expects exit code and one line, nothing on standard output and no file.
+  void expectError(int exit_code, Names arguments, const std::string& what) const
+  {
+    const std::string out = folder_ + "/out";
+    arguments.insert(arguments.end(), {"-o", out + ".yaml", "--json", out + ".json"});
+    const ProgramRun run = calibrate(arguments);
+    SCOPED_TRACE(run.err);
+    EXPECT_EQ(run.exit_code, exit_code);
+    EXPECT_EQ(run.errorLines(), 1);
+    EXPECT_EQ(run.out, "");
+    EXPECT_NE(run.err.find(what), std::string::npos) << what;
+    EXPECT_FALSE(std::filesystem::exists(out + ".yaml"));
+    EXPECT_FALSE(std::filesystem::exists(out + ".json"));
+  }
+
+  std::string folder_;
+};
+
+TEST_F(CalibrateProgram, FindsTheSimulatedKinectAndWritesIt)
+{
+  const std::string sensor_path = folder_ + "/mine.yaml";
+  Names arguments = simulate(3);
+  const std::string cloud = arguments.front();
+  arguments.insert(arguments.end(),
+                   {"-o", sensor_path, "--plot", folder_ + "/plot.svg", "--json", "-"});
+  const ProgramRun run = calibrate(arguments);
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(run.err, "");
+  const Json json = Json::parse(run.out);
+  EXPECT_EQ(json["frames"], 3);
+  // What kinect_v1.yaml says was simulated.
+  EXPECT_TRUE(contains(json["before_rounding_px"]["single_frame"], 0.17)) << run.out;
+  EXPECT_TRUE(contains(json["before_rounding_px"]["temporal"], 0.17)) << run.out;
+  EXPECT_TRUE(contains(json["sigma_point_px"], 0.35)) << run.out;
+  EXPECT_NEAR(json["quantum_px"]["value"], 0.125, 1e-6);
+
+  const Sensor sensor = loadSensor(sensor_path);
+  EXPECT_EQ(sensor.name, "mine");
+  EXPECT_EQ(sensor.camera.fx, 575.8);
+  const auto noise = std::dynamic_pointer_cast<const StereoNoiseModel>(sensor.noise);
+  ASSERT_NE(noise, nullptr);
+  // Five digits are written.
+  EXPECT_NEAR(noise->parameters().sigma_disparity_px,
+              json["sigma_disparity_px"]["single_frame"]["value"],
+              1e-5);
+  EXPECT_NEAR(sensor.disparity_quantum_px, 0.125, 1e-5);
+  EXPECT_EQ(test::readFile(folder_ + "/plot.svg").rfind("<svg", 0), 0U);
+
+  const ProgramRun fit = test::runProgram(
+      folder_,
+      {"fit", cloud, "--sensor", sensor_path, "--seeds", "20", "--json", "-"});
+  EXPECT_EQ(fit.exit_code, 0) << fit.err;
+}
+
+TEST_F(CalibrateProgram, TablesAndSentences)
+{
+  const Names frame = simulate(1);
+  const ProgramRun run = calibrate(frame);
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  for (const std::string words : {"640 x 480",
+                                  "whole planes",
+                                  "squares of 32 px",
+                                  "95 % interval",
+                                  "One frame",
+                                  "1/8 px.",
+                                  "The disparity noise is the same at all depths"})
+    EXPECT_NE(run.out.find(words), std::string::npos) << words << '\n' << run.out;
+
+  const ProgramRun small = calibrate({frame.front(), "--region", "32"});
+  EXPECT_NE(small.out.find("in a frame, about squares of 32 px"), std::string::npos)
+      << small.out;
+}
+
+TEST_F(CalibrateProgram, HelpTeaches)
+{
+  const ProgramRun run = calibrate({"--help"});
+  EXPECT_EQ(run.exit_code, 0);
+  EXPECT_NE(run.out.find("Examples:"), std::string::npos);
+  EXPECT_NE(run.out.find("--sensor mine.yaml"), std::string::npos);
+}
+
+TEST_F(CalibrateProgram, UsageErrorsExitWithTwo)
+{
+  const std::string cloud = folder_ + "/cloud.pcd";
+  saveCloud(cloud, test::bowlCloud(40, 30));
+  expectError(2, {}, "CLOUD");
+  expectError(2, {cloud, "--sensor", "no_such_sensor"}, "no_such_sensor");
+  expectError(2, {cloud, "--plot", folder_ + "/plot.png"}, "SVG");
+  for (const std::string region : {"0", "12", "-8", "all"})
+    expectError(2, {cloud, "--region", region}, "--region");
+}
+
+TEST_F(CalibrateProgram, BadFramesAreNamed)
+{
+  const std::string base = folder_ + "/";
+  const Camera camera = test::makeCamera(160, 120, 575.8);
+  const auto waves = [](int u, int v) {
+    return 1.0 + 0.05 * std::sin(u / 5.0) * std::sin(v / 5.0);
+  };
+  saveCloud(base + "waves.pcd", test::makeOrganizedCloud(camera, waves));
+  saveCloud(base + "small.pcd", test::bowlCloud(40, 30));
+  test::writeFile(base + "loose.ply",
+                  test::plyBytes<float>(test::bowlCloud(40, 30), "ascii"));
+  test::writeFile(base + "nan.pcd",
+                  test::pcdHeader(test::kXyzFields, 2, 2, "ascii") +
+                      "nan nan nan\nnan nan nan\nnan nan nan\nnan nan nan\n");
+  expectError(1, {base + "missing.pcd"}, "missing.pcd: no such file");
+  expectError(1, {base + "nan.pcd"}, "nan.pcd: has no valid point");
+  expectError(1, {base + "loose.ply"}, "loose.ply: not organized");
+  expectError(1,
+              {base + "waves.pcd", base + "small.pcd"},
+              "small.pcd: 40 x 30 pixels, where " + base + "waves.pcd has 160 x 120");
+  expectError(1, {base + "waves.pcd"}, "waves.pcd: nothing large and flat");
+  expectError(1, {base + "small.pcd"}, "small.pcd: nothing large and flat");
+}
+
+TEST_F(CalibrateProgram, UnwritableOutput)
+{
+  const Names frame = simulate(1);
+  for (const std::string option : {"-o", "--json", "--plot"}) {
+    const ProgramRun run =
+        calibrate({frame.front(), option, folder_ + "/none/result.svg"});
+    EXPECT_EQ(run.exit_code, 1);
+    EXPECT_EQ(run.errorLines(), 1) << run.err;
+    EXPECT_NE(run.err.find("none/result.svg"), std::string::npos) << run.err;
+  }
+}
+
+TEST_F(CalibrateProgram, RecordedTableHasItsKnownNoise)
+{
+  Names arguments;
+  for (const int frame : {17, 18, 19, 20, 22})
+    arguments.push_back(
+        test::recordedCloud("mosd_static_learn" + std::to_string(frame) + ".pcd"));
+  if (std::count(arguments.begin(), arguments.end(), "") > 0)
+    GTEST_SKIP() << "no recorded clouds: set HOLDFAST_DATA_DIR";
+  arguments.insert(arguments.end(), {"--sensor", "xtion", "--json", "-"});
+  const ProgramRun run = calibrate(arguments);
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const Json json = Json::parse(run.out);
+  EXPECT_EQ(json["planes"], 1);
+  // Measured independently, on all pixels that a plane fitted to the table by hand has
+  // within half a pixel of disparity.
+  EXPECT_TRUE(contains(json["sigma_disparity_px"]["temporal"], 0.052)) << run.out;
+  EXPECT_TRUE(contains(json["sigma_disparity_px"]["single_frame"], 0.138)) << run.out;
+  EXPECT_NEAR(json["sigma_disparity_px"]["temporal"]["value"], 0.052, 0.003);
+  EXPECT_NEAR(json["sigma_disparity_px"]["single_frame"]["value"], 0.138, 0.01);
+  // 1/8 px in units of a nominal f b that is one percent off.
+  EXPECT_NEAR(json["quantum_px"]["value"], 0.125, 0.01 * 0.125);
+  EXPECT_TRUE(json["sigma_point_px"].is_null());
+  // Small regions see half of it.
+  EXPECT_NEAR(json["by_region_size"][2]["single_frame"]["value"], 0.09, 0.005);
+  EXPECT_EQ(json["by_region_size"][2]["size_px"], 32);
+}
+
+}} // namespace holdfast
