@@ -30,6 +30,26 @@ find_library(HOLDFAST_PCL_FEATURES_LIBRARY pcl_features HINTS ${PCL_LIBRARY_DIRS
   REQUIRED)
 mark_as_advanced(HOLDFAST_PCL_FEATURES_LIBRARY)
 
+# Live cameras and .oni recordings.
+find_package(PkgConfig QUIET)
+if(PkgConfig_FOUND)
+  pkg_check_modules(OPENNI2 QUIET IMPORTED_TARGET libopenni2)
+endif()
+option(HOLDFAST_WITH_OPENNI2 "Clouds from cameras through OpenNI2" ${OPENNI2_FOUND})
+if(HOLDFAST_WITH_OPENNI2 AND NOT OPENNI2_FOUND)
+  message(FATAL_ERROR "HOLDFAST_WITH_OPENNI2 needs pkg-config and libopenni2-dev")
+endif()
+
+# The window of `holdfast live --view`.
+find_package(VTK QUIET COMPONENTS CommonCore CommonDataModel RenderingCore)
+find_package(X11 QUIET)
+if(VTK_FOUND AND X11_FOUND)
+  set(viewer_found ON)
+else()
+  set(viewer_found OFF)
+endif()
+option(HOLDFAST_WITH_VIEWER "A window for holdfast live" ${viewer_found})
+
 if(HOLDFAST_BUILD_APPS)
   find_package(CLI11 REQUIRED)
 endif()

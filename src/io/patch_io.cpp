@@ -406,6 +406,8 @@ writeJson(std::ostream& out, const PatchReport& report, JsonLayout layout)
   out << '{' << gap;
   member("holdfast", HOLDFAST_VERSION);
   member("cloud", report.cloud);
+  if (report.timestamp_us)
+    member("timestamp_us", *report.timestamp_us);
   member("sensor", sensorJson(report.sensor, report.sensor_pose));
   member("options", optionsJson(report));
   out << "\"patches\":[" << gap;

@@ -204,8 +204,8 @@ PointGatherer::countInvalidCovariances() const
     return noise_->isOmnidirectional() ? 0 : countBehindCamera();
   int count = 0;
   for (std::size_t i = 0; i < stored_.size(); ++i)
-    count += pcl::isFinite((*cloud_.points)[i]) &&
-             !isCovariance(stored_[i].cast<double>());
+    count +=
+        pcl::isFinite((*cloud_.points)[i]) && !isCovariance(stored_[i].cast<double>());
   return count;
 }
 

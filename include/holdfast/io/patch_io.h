@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <ostream>
 #include <string>
 #include <vector>
@@ -13,7 +14,8 @@ namespace holdfast {
 
 /// Everything a result file says about one cloud.
 struct PatchReport {
-  std::string cloud; ///< file the patches come from
+  std::string cloud; ///< file, or frame, the patches come from
+  std::optional<std::uint64_t> timestamp_us; ///< of a frame, by the camera's clock
   Sensor sensor; ///< as matched to the cloud
   Pose sensor_pose;
   ExtractionOptions options;
