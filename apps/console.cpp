@@ -16,6 +16,8 @@ namespace {
 
 constexpr int kBarWidth = 30;
 
+constexpr const char* kEraseRest = "\x1b[K"; // of the line
+
 /// The clouds a path stands for.
 std::vector<std::string>
 cloudsOf(const std::string& path)
@@ -76,27 +78,46 @@ forEachCloud(const std::vector<std::string>& paths,
   return exit_code;
 }
 
-ProgressBar::ProgressBar(std::string label, bool enabled)
-: label_(std::move(label)), enabled_(enabled && ::isatty(STDERR_FILENO) == 1)
+StatusLine::StatusLine(bool enabled) : enabled_(enabled && ::isatty(STDERR_FILENO) == 1)
 {}
 
-ProgressBar::~ProgressBar()
+StatusLine::~StatusLine()
 {
-  if (percent_ >= 0)
-    std::cerr << "\r\x1b[K" << std::flush;
+  wipe();
 }
+
+void
+StatusLine::show(const std::string& text)
+{
+  if (!enabled_)
+    return;
+  std::cerr << '\r' << text << kEraseRest << std::flush;
+  is_shown_ = true;
+}
+
+void
+StatusLine::wipe()
+{
+  if (is_shown_)
+    std::cerr << '\r' << kEraseRest << std::flush;
+  is_shown_ = false;
+}
+
+ProgressBar::ProgressBar(std::string label, bool enabled)
+: label_(std::move(label)), line_(enabled)
+{}
 
 void
 ProgressBar::update(int done, int total)
 {
   const int percent = total > 0 ? static_cast<int>(100LL * done / total) : 100;
-  if (!enabled_ || percent == percent_)
+  if (percent == percent_)
     return;
   percent_ = percent;
   const auto full = static_cast<std::size_t>(kBarWidth * percent / 100);
-  std::cerr << '\r' << label_ << " [" << std::string(full, '#')
-            << std::string(kBarWidth - full, ' ') << "] " << percent << " %"
-            << std::flush;
+  line_.show(label_ + " [" + std::string(full, '#') +
+             std::string(kBarWidth - full, ' ') + "] " + std::to_string(percent) +
+             " %");
 }
 
 double

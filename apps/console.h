@@ -23,19 +23,33 @@ void printNotice(const std::string& message);
 int forEachCloud(const std::vector<std::string>& paths,
                  const std::function<bool(const std::string&)>& work);
 
-/// A bar that is redrawn in place; nothing at all where standard error is no terminal.
+/// A line that is written over in place; nothing at all where standard error is no
+/// terminal.
+class StatusLine {
+public:
+  explicit StatusLine(bool enabled);
+  ~StatusLine(); ///< wipes the line away
+  StatusLine(const StatusLine&) = delete;
+  StatusLine& operator=(const StatusLine&) = delete;
+
+  void show(const std::string& text);
+  void wipe();
+
+private:
+  bool enabled_;
+  bool is_shown_ = false;
+};
+
+/// A bar in a status line.
 class ProgressBar {
 public:
   ProgressBar(std::string label, bool enabled);
-  ~ProgressBar(); ///< wipes the bar away
-  ProgressBar(const ProgressBar&) = delete;
-  ProgressBar& operator=(const ProgressBar&) = delete;
 
   void update(int done, int total);
 
 private:
   std::string label_;
-  bool enabled_;
+  StatusLine line_;
   int percent_ = -1;
 };
 

@@ -25,14 +25,20 @@ checkFolder(const std::string& folder)
 }
 
 void
-writePatchFiles(const PatchReport& report,
-                const std::string& folder,
-                const std::string& stem)
+makeFolder(const std::string& folder)
 {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error)
     throw std::runtime_error(folder + ": cannot be created: " + error.message());
+}
+
+void
+writePatchFiles(const PatchReport& report,
+                const std::string& folder,
+                const std::string& stem)
+{
+  makeFolder(folder);
   const fs::path base = fs::path(folder) / stem;
   AtomicFile json(base.string() + ".patches.json");
   AtomicFile points(base.string() + ".patches.pcd");

@@ -11,6 +11,9 @@ namespace holdfast {
 /// \throw std::runtime_error "FOLDER: cause".
 void checkFolder(const std::string& folder);
 
+/// Makes the folder unless it is there. \throw std::runtime_error "FOLDER: cause".
+void makeFolder(const std::string& folder);
+
 /// Writes STEM.patches.json, .pcd and .ply, all or none; makes the folder if need be.
 /// \throw std::runtime_error "PATH: cause".
 void writePatchFiles(const PatchReport& report,

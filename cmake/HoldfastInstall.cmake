@@ -10,6 +10,9 @@ install(DIRECTORY ${PROJECT_SOURCE_DIR}/config
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 if(TARGET holdfast)
   install(TARGETS holdfast)
+  if(TARGET holdfast_viewer)
+    install(TARGETS holdfast_viewer DESTINATION ${CMAKE_INSTALL_LIBDIR}/holdfast)
+  endif()
 endif()
 
 # One export set per component: core must be usable where PCL is not installed.

@@ -1,0 +1,110 @@
+#include "frame_recorder.h"
+
+#include "patch_output.h"
+
+#include <holdfast/io/cloud_io.h>
+
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <stdexcept>
+#include <utility>
+
+namespace holdfast {
+namespace {
+
+/// A second of a camera's frames, 110 MB.
+constexpr std::size_t kMostWaiting = 30;
+
+} // namespace
+
+std::string
+frameName(std::uint64_t number)
+{
+  char name[32];
+  std::snprintf(name,
+                sizeof name,
+                "frame_%06llu",
+                static_cast<unsigned long long>(number));
+  return name;
+}
+
+FrameRecorder::FrameRecorder(std::string folder) : folder_(std::move(folder))
+{
+  makeFolder(folder_);
+  if (std::filesystem::exists(folder_ + "/" + frameName(1) + ".pcd"))
+    throw std::runtime_error(folder_ + ": holds frames already");
+  thread_ = std::thread([this] { write(); });
+}
+
+FrameRecorder::~FrameRecorder()
+{
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    over_ = true;
+    changed_.notify_all();
+  }
+  thread_.join();
+}
+
+void
+FrameRecorder::throwError() const
+{
+  if (!error_.empty())
+    throw std::runtime_error(error_);
+}
+
+void
+FrameRecorder::push(const RangeFrame::ConstPtr& frame)
+{
+  const std::lock_guard<std::mutex> lock(mutex_);
+  throwError();
+  if (waiting_.size() >= kMostWaiting) {
+    ++dropped_;
+    return;
+  }
+  waiting_.push_back(frame);
+  changed_.notify_all();
+}
+
+void
+FrameRecorder::finish()
+{
+  std::unique_lock<std::mutex> lock(mutex_);
+  changed_.wait(lock, [this] { return waiting_.empty() || !error_.empty(); });
+  throwError();
+}
+
+std::uint64_t
+FrameRecorder::dropped() const
+{
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return dropped_;
+}
+
+void
+FrameRecorder::write()
+{
+  std::unique_lock<std::mutex> lock(mutex_);
+  while (error_.empty()) {
+    changed_.wait(lock, [this] { return over_ || !waiting_.empty(); });
+    if (waiting_.empty())
+      return;
+    const RangeFrame::ConstPtr frame = waiting_.front();
+    lock.unlock();
+    std::string error;
+    try {
+      saveCloud(folder_ + "/" + frameName(written_ + 1) + ".pcd", frame->cloud);
+    }
+    catch (const std::exception& failure) {
+      error = failure.what();
+    }
+    lock.lock();
+    ++written_;
+    error_ = error;
+    waiting_.pop_front();
+    changed_.notify_all();
+  }
+}
+
+} // namespace holdfast

@@ -1,0 +1,340 @@
+#include "command_line.h"
+#include "commands.h"
+#include "console.h"
+#include "device_options.h"
+#include "extraction_options.h"
+#include "grabber_run.h"
+#include "input_options.h"
+#include "live_statistics.h"
+#include "patch_output.h"
+#include "recording.h"
+#include "render_colors.h"
+#include "summary.h"
+#include "viewer.h"
+
+#include <holdfast/pcl/frame_extraction.h>
+
+#include <CLI/CLI.hpp>
+
+#include <cmath>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace holdfast {
+namespace {
+
+constexpr const char* kExamples = R"(Examples:
+  holdfast live
+      patches of the first camera, with a line that says how fast
+  holdfast live --max-patches 100 --budget-ms 10 --surface plane --json-lines -
+      at most 100 planes a frame, for another program: one line of JSON per frame
+  holdfast live --view
+      the same in a window
+  holdfast live --record walk.oni -o walk
+      keeps what the camera saw, and the patches of every frame
+  holdfast live --device walk.oni --every-frame -o walk
+      the same patches, and those of all frames, from the recording
+
+Newer frames replace those that wait, so that patches are always of the latest view;
+frames lost that way are counted as dropped. Seeds whose patch was good in the frame
+before have their turn first, so that patches stay while the scene does. Latency runs
+from the arrival of a frame at this computer to its patches.
+)";
+
+constexpr int kDefaultPatches = 300;
+constexpr double kDefaultBudgetMs = 25.0;
+
+struct LiveSettings {
+  Openni2Options device;
+  std::string sensor_name = "kinect_v1";
+  ExtractionSettings extraction;
+  double budget_ms = kDefaultBudgetMs;
+  RunOptions run;
+  std::string record_path;
+  std::string json_path; ///< empty: none; "-": standard output
+  std::string output_folder; ///< empty: none
+  bool view = false;
+};
+
+/// One line of JSON per frame, for programs that wait for it.
+class JsonLines {
+public:
+  explicit JsonLines(const std::string& path)
+  : path_(path == "-" ? "standard output" : path)
+  {
+    if (path != "-") {
+      file_.open(path);
+      check(file_);
+    }
+  }
+
+  void write(const PatchReport& report)
+  {
+    std::ostream& out = file_.is_open() ? file_ : std::cout;
+    writeJson(out, report, JsonLayout::OneLine);
+    check(out.flush());
+  }
+
+private:
+  void check(const std::ostream& out) const
+  {
+    if (!out)
+      throw std::runtime_error(path_ + ": cannot be written");
+  }
+
+  std::string path_;
+  std::ofstream file_;
+};
+
+/// Ends of the scale of colours, rms angle of the normal, degrees.
+constexpr double kSurest = 0.1;
+constexpr double kLeastSure = 10.0;
+
+ShownPatch
+toShown(const ExtractedPatch& patch)
+{
+  const FitResult& fit = patch.fit;
+  const double sigma_deg = normalSigmaDegrees(fit);
+  const Eigen::Vector2d kappa = fit.patch.principalCurvatures();
+  ShownPatch shown;
+  shown.patch = fit.patch;
+  shown.centre_covariance = fit.covariance.bottomRightCorner<3, 3>();
+  shown.color = viridis(std::log(sigma_deg / kSurest) / std::log(kLeastSure / kSurest));
+  shown.caption =
+      spacedName(fit.patch.type.surface) + ", " + std::to_string(fit.points) +
+      " points, chi2/dof " + formatNumber("%.2f", chi2PerDof(fit)) + "\ncurvatures " +
+      formatNumber("%.2f", kappa.x()) + " and " + formatNumber("%.2f 1/m", kappa.y()) +
+      "\nsigma: normal " + formatNumber("%.2f deg", sigma_deg) + ", centre " +
+      formatNumber("%.2f mm", centreSigmaMillimetres(fit));
+  shown.seed = patch.seed_index.value_or(0);
+  return shown;
+}
+
+/// Hands the newest frame from the grabber's thread to the window's.
+class View {
+public:
+  View() : window_(openViewer("dark: normal within 0.1 deg, yellow: within 10 deg")) {}
+
+  void put(const RangeFrame::ConstPtr& frame,
+           const std::vector<ExtractedPatch>& patches)
+  {
+    std::vector<ShownPatch> shown;
+    for (const ExtractedPatch& patch : patches)
+      shown.push_back(toShown(patch));
+    const std::lock_guard<std::mutex> lock(mutex_);
+    frame_ = frame;
+    patches_ = std::move(shown);
+  }
+
+  /// \return false when the window was closed.
+  bool update()
+  {
+    std::unique_lock<std::mutex> lock(mutex_);
+    const RangeFrame::ConstPtr frame = std::exchange(frame_, nullptr);
+    const std::vector<ShownPatch> patches = std::move(patches_);
+    lock.unlock();
+    if (frame)
+      window_->show(*frame, patches);
+    return window_->update();
+  }
+
+private:
+  std::unique_ptr<Viewer> window_;
+  std::mutex mutex_;
+  RangeFrame::ConstPtr frame_; ///< null: nothing new
+  std::vector<ShownPatch> patches_;
+};
+
+/// From frames to patches, and to where they are wanted.
+class LiveSession {
+public:
+  LiveSession(const LiveSettings& settings, Openni2Grabber& grabber);
+
+  /// On the grabber's thread.
+  void process(const RangeFrame::ConstPtr& frame);
+
+  void finish()
+  {
+    if (recording_)
+      recording_->finish();
+  }
+
+  std::uint64_t dropped() const
+  {
+    return grabber_.statistics().dropped;
+  }
+
+  const LiveStatistics& statistics() const
+  {
+    return statistics_;
+  }
+
+  /// \return false when the user has closed the window.
+  bool updateView()
+  {
+    return !view_ || view_->update();
+  }
+
+private:
+  void write(const RangeFrame& frame, PatchReport& report);
+
+  const LiveSettings& settings_;
+  Openni2Grabber& grabber_;
+  Sensor sensor_;
+  FrameExtractor extractor_;
+  std::optional<Recording> recording_;
+  std::optional<JsonLines> json_;
+  std::optional<View> view_;
+  LiveStatistics statistics_;
+};
+
+Sensor
+withCamera(Sensor sensor, const Camera& camera)
+{
+  sensor.camera = camera;
+  return sensor;
+}
+
+LiveSession::LiveSession(const LiveSettings& settings, Openni2Grabber& grabber)
+: settings_(settings)
+, grabber_(grabber)
+, sensor_(withCamera(loadSensorOption(settings.sensor_name), grabber.camera()))
+, extractor_(sensor_, settings.extraction.options)
+{
+  if (!settings.output_folder.empty())
+    makeFolder(settings.output_folder);
+  if (settings.view)
+    view_.emplace();
+  if (!settings.json_path.empty())
+    json_.emplace(settings.json_path);
+  if (!settings.record_path.empty())
+    recording_.emplace(grabber, settings.record_path);
+}
+
+void
+LiveSession::process(const RangeFrame::ConstPtr& frame)
+{
+  if (recording_)
+    recording_->push(frame);
+  PatchReport report;
+  const Stopwatch watch;
+  report.result = extractor_.extract(frame->cloud);
+  report.fit_ms = watch.milliseconds();
+  statistics_.addFrame(frame->received, report.result.patches);
+  if (view_)
+    view_->put(frame, report.result.patches);
+  write(*frame, report);
+}
+
+void
+LiveSession::write(const RangeFrame& frame, PatchReport& report)
+{
+  report.cloud = frameName(statistics_.frames());
+  report.timestamp_us = frame.timestamp_us;
+  report.sensor = sensor_;
+  report.options = settings_.extraction.options;
+  if (json_)
+    json_->write(report);
+  if (!settings_.output_folder.empty() && !report.result.patches.empty())
+    writePatchFiles(report, settings_.output_folder, report.cloud);
+}
+
+int
+runLive(const CLI::App& command, LiveSettings& settings)
+{
+  finishExtractionOptions(command, settings.extraction);
+  settings.extraction.options.sampler.max_time_s = 1e-3 * settings.budget_ms;
+  settings.device.color = settings.view || !settings.record_path.empty();
+  settings.run.reconnects = settings.device.reconnect;
+  Openni2Grabber grabber(settings.device);
+  LiveSession session(settings, grabber);
+  RunCallbacks callbacks;
+  callbacks.frame = [&session](const auto& frame) { session.process(frame); };
+  callbacks.status = [&session] {
+    return session.statistics().pace() + ", " + session.statistics().work() + ", " +
+           std::to_string(session.dropped()) + " dropped";
+  };
+  callbacks.idle = [&session] { return session.updateView(); };
+  const int exit_code = runGrabber(grabber, settings.run, callbacks);
+  session.finish();
+  if (!settings.run.quiet)
+    (settings.json_path == "-" ? std::cerr : std::cout)
+        << session.statistics().summary(session.dropped());
+  return exit_code;
+}
+
+void
+addLiveOptions(CLI::App& command, LiveSettings& settings)
+{
+  addDeviceOptions(command, settings.device);
+  addSensorOption(command, settings.sensor_name);
+  addExtractionOptions(command, settings.extraction);
+  SamplerOptions& sampler = settings.extraction.options.sampler;
+  sampler.max_patches = kDefaultPatches;
+  command.get_option("--max-patches")->default_str(std::to_string(kDefaultPatches));
+  command
+      .add_option("--seeds",
+                  sampler.max_seeds,
+                  "Most seeds a frame; default: three for every patch")
+      ->check(CLI::Range(1, 100000000, "N"))
+      ->type_name("")
+      ->group("Seeds and neighbourhoods");
+  command
+      .add_option("--budget-ms",
+                  settings.budget_ms,
+                  "Start no new patch when a frame has taken so long, milliseconds")
+      ->check(positiveNumber("MS"))
+      ->type_name("")
+      ->capture_default_str()
+      ->group("Seeds and neighbourhoods");
+  addRunOptions(command, settings.run);
+  command
+      .add_option("--record",
+                  settings.record_path,
+                  "Record the camera: an .oni file, or a folder for a PCD per frame")
+      ->type_name("FILE.oni|DIR")
+      ->group("Output");
+  command
+      .add_option("--json-lines",
+                  settings.json_path,
+                  "Write the patches of each frame as a line of JSON to this file, or "
+                  "with - to standard output and nothing else there")
+      ->type_name("FILE")
+      ->group("Output");
+  command
+      .add_option("-o,--output",
+                  settings.output_folder,
+                  "Write the patches of each frame as frame_000001.patches.json, .pcd "
+                  "and .ply here")
+      ->type_name("DIR")
+      ->group("Output");
+  command
+      .add_flag("--view",
+                settings.view,
+                "Show points and patches in a window, coloured by the uncertainty of "
+                "their normals")
+      ->group("Output");
+  tidyHelp(command);
+}
+
+} // namespace
+
+void
+addLiveCommand(CLI::App& app, int& exit_code)
+{
+  CLI::App* command =
+      app.add_subcommand("live", "Fit patches to a depth camera's frames as they come");
+  command->footer(kExamples);
+  const auto settings = std::make_shared<LiveSettings>();
+  addLiveOptions(*command, *settings);
+  command->callback(
+      [command, settings, &exit_code] { exit_code = runLive(*command, *settings); });
+}
+
+} // namespace holdfast

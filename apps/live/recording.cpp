@@ -1,0 +1,38 @@
+#include "recording.h"
+
+#include <filesystem>
+
+namespace holdfast {
+
+Recording::Recording(Openni2Grabber& grabber, const std::string& path)
+: grabber_(grabber)
+{
+  if (std::filesystem::path(path).extension() == ".oni")
+    grabber_.startRecording(path);
+  else
+    folder_ = std::make_unique<FrameRecorder>(path);
+}
+
+void
+Recording::push(const RangeFrame::ConstPtr& frame)
+{
+  if (folder_)
+    folder_->push(frame);
+}
+
+void
+Recording::finish()
+{
+  if (folder_)
+    folder_->finish();
+  else
+    grabber_.stopRecording();
+}
+
+std::uint64_t
+Recording::dropped() const
+{
+  return folder_ ? folder_->dropped() : 0;
+}
+
+} // namespace holdfast

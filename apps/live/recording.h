@@ -1,0 +1,34 @@
+/// \file What --record writes.
+#pragma once
+
+#include "frame_recorder.h"
+
+#include <holdfast/io/openni2_grabber.h>
+
+#include <memory>
+#include <string>
+
+namespace holdfast {
+
+/// A recording of a camera: an .oni file, which the grabber writes itself and which
+/// holds all it delivers, or a folder with a PCD for every frame.
+class Recording {
+public:
+  /// \throw std::exception in one line when it cannot be begun.
+  Recording(Openni2Grabber& grabber, const std::string& path);
+
+  /// To be called for every frame. \throw std::runtime_error when the disk is full.
+  void push(const RangeFrame::ConstPtr& frame);
+
+  /// \throw std::exception in one line when it is not complete.
+  void finish();
+
+  /// Frames that came too fast for the disk.
+  std::uint64_t dropped() const;
+
+private:
+  Openni2Grabber& grabber_;
+  std::unique_ptr<FrameRecorder> folder_; ///< null: an .oni file
+};
+
+} // namespace holdfast
