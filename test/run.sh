@@ -19,11 +19,4 @@ build_in "$root/build-test" -DCMAKE_BUILD_TYPE=Release -DHOLDFAST_WERROR=$werror
 ctest --test-dir "$root/build-test" --output-on-failure --parallel 2 "$@"
 (($#)) && exit
 
-# Without Highway, whose vectors take sanitizers minutes to compile, and of the programs
-# only what is run.
-sanitized=(fit_degenerate pcl_misuse point_types)
-build_in "$root/build-sanitize" -DCMAKE_BUILD_TYPE=RelWithDebInfo \
-  -DHOLDFAST_SANITIZE="address;undefined" -DHOLDFAST_WITH_HIGHWAY=OFF \
-  -- "${sanitized[@]/#/test_}"
-ctest --test-dir "$root/build-sanitize" --output-on-failure --parallel 2 \
-  -R "^($(IFS="|" && echo "${sanitized[*]}"))\$"
+"$root/test/sanitize.sh"
