@@ -1,5 +1,6 @@
 #include "openni2_device.h"
 
+#include "openni2_frames.h"
 #include "openni2_runtime.h"
 
 #include <fstream>

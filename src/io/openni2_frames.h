@@ -6,6 +6,8 @@
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 
+#include <optional>
+
 namespace holdfast::io {
 
 /// Lets a depth image wait for its colour, but not longer than for the next depth
@@ -38,6 +40,15 @@ private:
   Image depth_;
   Image color_;
 };
+
+/// The camera that was given, or else one of these fields of view, rad, whose axis
+/// passes through the middle of the image. \throw pcl::IOException when the one given
+/// is of another size, or a field of view makes no sense.
+Camera chooseCamera(const std::optional<Camera>& given,
+                    int width,
+                    int height,
+                    double horizontal_fov,
+                    double vertical_fov);
 
 /// Organized cloud in the camera frame, m; NaN where the depth is 0. Its header has the
 /// image's time stamp and index. \throw pcl::IOException when the image is not of the

@@ -1,5 +1,6 @@
 #include "openni2_player.h"
 
+#include "openni2_frames.h"
 #include "openni2_runtime.h"
 
 #include <algorithm>

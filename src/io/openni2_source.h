@@ -63,13 +63,4 @@ protected:
   SourceInfo info_;
 };
 
-/// The camera that was given, or else one of these fields of view, rad, whose axis
-/// passes through the middle of the image. \throw pcl::IOException when the one given
-/// is of another size, or a field of view makes no sense.
-Camera chooseCamera(const std::optional<Camera>& given,
-                    int width,
-                    int height,
-                    double horizontal_fov,
-                    double vertical_fov);
-
 } // namespace holdfast::io

@@ -91,10 +91,10 @@ std::vector<Openni2DeviceInfo> listOpenni2Devices();
 /// nothing was measured. A point has the newest colour image taken at most half a
 /// period before the depth, for which the depth waits one period if need be.
 ///
-/// All callbacks run on one thread of the grabber, except that of a recording which
-/// fails because the grabber is deleted. While they run, newer frames replace older
-/// ones: a slow consumer gets the newest, and statistics() counts the others. Events
-/// that nobody is registered for are printed with PCL_WARN.
+/// All callbacks run on one thread of the grabber, except RecordingFailed where
+/// the deletion of the grabber ends the recording. While they run, newer frames replace
+/// older ones: a slow consumer gets the newest, and statistics() counts the others.
+/// Events that nobody is registered for are printed with PCL_WARN.
 ///
 /// Any function may be called from any thread, also from a callback, where stop() takes
 /// effect when the callback returns. The grabber may even be deleted there; the device
@@ -127,9 +127,10 @@ public:
   bool hasColor() const;
   GrabberStatistics statistics() const;
 
-  /// Writes all that the camera delivers from now on, also what no callback sees, to an
-  /// .oni file, without loss; until stopRecording(), which makes the file complete, or
-  /// a failure of the device. OpenNI2 can do that for one grabber at a time.
+  /// Writes all that the camera delivers, also what no callback sees, to an .oni file
+  /// without loss: from when the writer is ready, moments later, until stopRecording(),
+  /// which makes the file complete, or a failure of the device. OpenNI2 can do that for
+  /// one grabber at a time.
   /// \throw pcl::IOException when a recording runs or is being played, the device is
   /// gone, or the file cannot be written.
   void startRecording(const std::string& path);
