@@ -191,6 +191,13 @@ TEST(LiveProgram, PlaysARecordingAlikeEveryTime)
   const std::vector<Json> once = play("1");
   EXPECT_GE(once.size(), 1U); // OpenNI2 may miss the first, before its writer is ready
   EXPECT_EQ(once, play("3"));
+
+  const std::string frames = folder + "/frames";
+  const auto unpacked =
+      runProgram(folder,
+                 {"record", "-o", frames, "--device", recording, "--every-frame"});
+  EXPECT_EQ(unpacked.exit_code, 0) << unpacked.err;
+  EXPECT_EQ(filesIn(frames).size(), once.size());
 }
 
 TEST(LiveProgram, WritesPatchFilesAndRecordsMeanwhile)

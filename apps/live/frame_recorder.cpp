@@ -29,7 +29,8 @@ frameName(std::uint64_t number)
   return name;
 }
 
-FrameRecorder::FrameRecorder(std::string folder) : folder_(std::move(folder))
+FrameRecorder::FrameRecorder(std::string folder, bool frames_can_wait)
+: folder_(std::move(folder)), frames_can_wait_(frames_can_wait)
 {
   makeFolder(folder_);
   if (std::filesystem::exists(folder_ + "/" + frameName(1) + ".pcd"))
@@ -57,7 +58,10 @@ FrameRecorder::throwError() const
 void
 FrameRecorder::push(const RangeFrame::ConstPtr& frame)
 {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  std::unique_lock<std::mutex> lock(mutex_);
+  if (frames_can_wait_)
+    changed_.wait(lock,
+                  [this] { return waiting_.size() < kMostWaiting || !error_.empty(); });
   throwError();
   if (waiting_.size() >= kMostWaiting) {
     ++dropped_;

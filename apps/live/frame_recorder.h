@@ -17,11 +17,11 @@ std::string frameName(std::uint64_t number);
 
 /// Writes frames as FOLDER/frame_000001.pcd and so on, each whole or not at all, on a
 /// thread of its own. When the disk is slower than the camera, frames are dropped and
-/// counted.
+/// counted, or waited for where they can wait.
 class FrameRecorder {
 public:
   /// \throw std::runtime_error "FOLDER: cause" when it cannot be made, or holds frames.
-  explicit FrameRecorder(std::string folder);
+  FrameRecorder(std::string folder, bool frames_can_wait);
   ~FrameRecorder();
   FrameRecorder(const FrameRecorder&) = delete;
   FrameRecorder& operator=(const FrameRecorder&) = delete;
@@ -39,6 +39,7 @@ private:
   void throwError() const;
 
   const std::string folder_;
+  const bool frames_can_wait_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<RangeFrame::ConstPtr> waiting_;

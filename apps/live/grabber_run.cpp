@@ -145,7 +145,9 @@ tell(const GrabberEvent& event, const RunOptions& options)
   case Kind::Unplugged:
   case Kind::Stalled:
   case Kind::DeviceError:
-    printError(event.message + (options.reconnects ? "; waiting for its return" : ""));
+    printError(event.message +
+               (options.records_oni ? "; the recording ends here" : "") +
+               (options.reconnects ? "; waiting for its return" : ""));
     return options.reconnects;
   case Kind::RecordingFailed:
   case Kind::CallbackFailed:

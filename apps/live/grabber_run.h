@@ -14,6 +14,7 @@ struct RunOptions {
   double seconds = 0.0; ///< end after this time; 0: never
   bool quiet = false; ///< errors only
   bool reconnects = true; ///< the camera's return is waited for
+  bool records_oni = false; ///< a recording that ends when the camera fails
 };
 
 struct RunCallbacks {

@@ -7,24 +7,19 @@
 #include "input_options.h"
 #include "live_statistics.h"
 #include "patch_output.h"
+#include "patch_view.h"
 #include "recording.h"
-#include "render_colors.h"
-#include "summary.h"
-#include "viewer.h"
 
 #include <holdfast/pcl/frame_extraction.h>
 
 #include <CLI/CLI.hpp>
 
-#include <cmath>
 #include <fstream>
 #include <iostream>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <stdexcept>
 #include <string>
-#include <utility>
 
 namespace holdfast {
 namespace {
@@ -92,65 +87,6 @@ private:
   std::ofstream file_;
 };
 
-/// Ends of the scale of colours, rms angle of the normal, degrees.
-constexpr double kSurest = 0.1;
-constexpr double kLeastSure = 10.0;
-
-ShownPatch
-toShown(const ExtractedPatch& patch)
-{
-  const FitResult& fit = patch.fit;
-  const double sigma_deg = normalSigmaDegrees(fit);
-  const Eigen::Vector2d kappa = fit.patch.principalCurvatures();
-  ShownPatch shown;
-  shown.patch = fit.patch;
-  shown.centre_covariance = fit.covariance.bottomRightCorner<3, 3>();
-  shown.color = viridis(std::log(sigma_deg / kSurest) / std::log(kLeastSure / kSurest));
-  shown.caption =
-      spacedName(fit.patch.type.surface) + ", " + std::to_string(fit.points) +
-      " points, chi2/dof " + formatNumber("%.2f", chi2PerDof(fit)) + "\ncurvatures " +
-      formatNumber("%.2f", kappa.x()) + " and " + formatNumber("%.2f 1/m", kappa.y()) +
-      "\nsigma: normal " + formatNumber("%.2f deg", sigma_deg) + ", centre " +
-      formatNumber("%.2f mm", centreSigmaMillimetres(fit));
-  shown.seed = patch.seed_index.value_or(0);
-  return shown;
-}
-
-/// Hands the newest frame from the grabber's thread to the window's.
-class View {
-public:
-  View() : window_(openViewer("dark: normal within 0.1 deg, yellow: within 10 deg")) {}
-
-  void put(const RangeFrame::ConstPtr& frame,
-           const std::vector<ExtractedPatch>& patches)
-  {
-    std::vector<ShownPatch> shown;
-    for (const ExtractedPatch& patch : patches)
-      shown.push_back(toShown(patch));
-    const std::lock_guard<std::mutex> lock(mutex_);
-    frame_ = frame;
-    patches_ = std::move(shown);
-  }
-
-  /// \return false when the window was closed.
-  bool update()
-  {
-    std::unique_lock<std::mutex> lock(mutex_);
-    const RangeFrame::ConstPtr frame = std::exchange(frame_, nullptr);
-    const std::vector<ShownPatch> patches = std::move(patches_);
-    lock.unlock();
-    if (frame)
-      window_->show(*frame, patches);
-    return window_->update();
-  }
-
-private:
-  std::unique_ptr<Viewer> window_;
-  std::mutex mutex_;
-  RangeFrame::ConstPtr frame_; ///< null: nothing new
-  std::vector<ShownPatch> patches_;
-};
-
 /// From frames to patches, and to where they are wanted.
 class LiveSession {
 public:
@@ -165,10 +101,8 @@ public:
       recording_->finish();
   }
 
-  std::uint64_t dropped() const
-  {
-    return grabber_.statistics().dropped;
-  }
+  /// "3 dropped", and what the disk was too slow for.
+  std::string droppedText() const;
 
   const LiveStatistics& statistics() const
   {
@@ -190,7 +124,7 @@ private:
   FrameExtractor extractor_;
   std::optional<Recording> recording_;
   std::optional<JsonLines> json_;
-  std::optional<View> view_;
+  std::optional<PatchView> view_;
   LiveStatistics statistics_;
 };
 
@@ -214,7 +148,7 @@ LiveSession::LiveSession(const LiveSettings& settings, Openni2Grabber& grabber)
   if (!settings.json_path.empty())
     json_.emplace(settings.json_path);
   if (!settings.record_path.empty())
-    recording_.emplace(grabber, settings.record_path);
+    recording_.emplace(grabber, settings.record_path, settings.device.playback);
 }
 
 void
@@ -245,6 +179,15 @@ LiveSession::write(const RangeFrame& frame, PatchReport& report)
     writePatchFiles(report, settings_.output_folder, report.cloud);
 }
 
+std::string
+LiveSession::droppedText() const
+{
+  std::string text = std::to_string(grabber_.statistics().dropped) + " dropped";
+  if (const std::uint64_t lost = recording_ ? recording_->dropped() : 0; lost > 0)
+    text += ", " + std::to_string(lost) + " more not recorded";
+  return text;
+}
+
 int
 runLive(const CLI::App& command, LiveSettings& settings)
 {
@@ -252,20 +195,21 @@ runLive(const CLI::App& command, LiveSettings& settings)
   settings.extraction.options.sampler.max_time_s = 1e-3 * settings.budget_ms;
   settings.device.color = settings.view || !settings.record_path.empty();
   settings.run.reconnects = settings.device.reconnect;
+  settings.run.records_oni = isOniPath(settings.record_path);
   Openni2Grabber grabber(settings.device);
   LiveSession session(settings, grabber);
   RunCallbacks callbacks;
   callbacks.frame = [&session](const auto& frame) { session.process(frame); };
   callbacks.status = [&session] {
     return session.statistics().pace() + ", " + session.statistics().work() + ", " +
-           std::to_string(session.dropped()) + " dropped";
+           session.droppedText();
   };
   callbacks.idle = [&session] { return session.updateView(); };
   const int exit_code = runGrabber(grabber, settings.run, callbacks);
   session.finish();
   if (!settings.run.quiet)
     (settings.json_path == "-" ? std::cerr : std::cout)
-        << session.statistics().summary(session.dropped());
+        << session.statistics().summary(session.droppedText());
   return exit_code;
 }
 

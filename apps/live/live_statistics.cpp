@@ -118,7 +118,7 @@ LiveStatistics::overallPace() const
 }
 
 std::string
-LiveStatistics::summary(std::uint64_t dropped) const
+LiveStatistics::summary(const std::string& dropped) const
 {
   const std::string pace = overallPace();
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -130,7 +130,7 @@ LiveStatistics::summary(std::uint64_t dropped) const
     return std::to_string(patches_.quantile(share));
   };
   std::ostringstream out;
-  out << pace << ", " << dropped << " dropped\n"
+  out << pace << ", " << dropped << '\n'
       << "latency   median " << latency(0.5) << ", 99 % within " << latency(0.99)
       << ", largest " << latency(1.0) << '\n'
       << "patches   median " << patches(0.5) << " a frame, 99 % at least "

@@ -49,8 +49,9 @@ public:
   /// "1800 frames in 60.0 s, 30.0 Hz".
   std::string overallPace() const;
 
-  /// A table of rate, latency, patches and memory of the whole run.
-  std::string summary(std::uint64_t dropped) const;
+  /// Lines about rate, latency, patches and memory of the whole run.
+  /// \param dropped how many frames were lost, in words.
+  std::string summary(const std::string& dropped) const;
 
 private:
   mutable std::mutex mutex_;

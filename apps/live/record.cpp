@@ -39,9 +39,12 @@ struct RecordSettings {
 int
 runRecord(RecordSettings& settings)
 {
+  settings.run.records_oni = isOniPath(settings.output);
+  // Nothing can be added to an .oni file that the camera's failure has ended.
+  settings.device.reconnect = settings.device.reconnect && !settings.run.records_oni;
   settings.run.reconnects = settings.device.reconnect;
   Openni2Grabber grabber(settings.device);
-  Recording recording(grabber, settings.output);
+  Recording recording(grabber, settings.output, settings.device.playback);
   LiveStatistics statistics;
   const auto dropped = [&] {
     return std::to_string(recording.dropped() + grabber.statistics().dropped) +

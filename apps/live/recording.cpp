@@ -4,13 +4,21 @@
 
 namespace holdfast {
 
-Recording::Recording(Openni2Grabber& grabber, const std::string& path)
+bool
+isOniPath(const std::string& path)
+{
+  return std::filesystem::path(path).extension() == ".oni";
+}
+
+Recording::Recording(Openni2Grabber& grabber,
+                     const std::string& path,
+                     Playback playback)
 : grabber_(grabber)
 {
-  if (std::filesystem::path(path).extension() == ".oni")
+  if (isOniPath(path))
     grabber_.startRecording(path);
   else
-    folder_ = std::make_unique<FrameRecorder>(path);
+    folder_ = std::make_unique<FrameRecorder>(path, playback == Playback::EveryFrame);
 }
 
 void

@@ -10,12 +10,15 @@
 
 namespace holdfast {
 
+/// Whether a recording of this name is an .oni file.
+bool isOniPath(const std::string& path);
+
 /// A recording of a camera: an .oni file, which the grabber writes itself and which
 /// holds all it delivers, or a folder with a PCD for every frame.
 class Recording {
 public:
   /// \throw std::exception in one line when it cannot be begun.
-  Recording(Openni2Grabber& grabber, const std::string& path);
+  Recording(Openni2Grabber& grabber, const std::string& path, Playback playback);
 
   /// To be called for every frame. \throw std::runtime_error when the disk is full.
   void push(const RangeFrame::ConstPtr& frame);
