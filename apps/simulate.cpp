@@ -293,7 +293,7 @@ addSimulateCommand(CLI::App& app, int& exit_code)
 {
   auto arguments = std::make_shared<SimulateArguments>();
   CLI::App* command =
-      app.add_subcommand("simulate", "make a depth camera's cloud of a known scene");
+      app.add_subcommand("simulate", "Make a depth camera's cloud of a known scene");
   addSceneOptions(*command, *arguments);
   addNoiseOptions(*command, *arguments);
   command->footer("Examples:\n"
