@@ -127,8 +127,10 @@ void
 addCameraOptions(CLI::App& command, CalibrateSettings& settings)
 {
   addDeviceOptions(command, settings.device);
+  for (const char* meaningless : {"--every-frame", "--no-reconnect"})
+    command.remove_option(command.get_option(meaningless));
   command.add_option("--frames", settings.frames, "Take so many frames of the camera")
-      ->check(CLI::Range(1, 10000, "N"))
+      ->check(CLI::Range(1, 1000, "N"))
       ->type_name("")
       ->capture_default_str()
       ->group("Camera");

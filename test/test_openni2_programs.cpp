@@ -297,6 +297,14 @@ TEST(LiveProgram, TheCameraMayGoAndComeBack)
   EXPECT_EQ(run.exit_code, 0);
   EXPECT_NE(run.err.find("was unplugged; waiting for its return"), std::string::npos)
       << run.err;
+  // OpenNI2 asks for threads that have ended, such as that of the recorder.
+  const auto recorded = runProgram(
+      folder,
+      Arguments{"live", "--frames", "12", "--quiet", "--record", folder + "/walk.oni"} +
+          kQuick);
+  EXPECT_EQ(recorded.exit_code, 1);
+  EXPECT_NE(recorded.err.find("the recording ends here; waiting"), std::string::npos)
+      << recorded.err;
   const auto gone = runProgram(folder, Arguments{"live", "--no-reconnect"} + kQuick);
   EXPECT_EQ(gone.exit_code, 1);
   EXPECT_NE(gone.err.find("was unplugged\n"), std::string::npos) << gone.err;

@@ -12,6 +12,7 @@ captureFrames(const Openni2Options& options, int frames, Camera& camera)
   Openni2Options depth_only = options;
   depth_only.color = false;
   depth_only.reconnect = false;
+  depth_only.playback = Playback::EveryFrame;
   Openni2Grabber grabber(depth_only);
   camera = grabber.camera();
   std::vector<RangeCloud> clouds;

@@ -16,6 +16,8 @@ namespace {
 /// A second of a camera's frames, 110 MB.
 constexpr std::size_t kMostWaiting = 30;
 
+constexpr const char* kFramePrefix = "frame_";
+
 } // namespace
 
 std::string
@@ -24,17 +26,25 @@ frameName(std::uint64_t number)
   char name[32];
   std::snprintf(name,
                 sizeof name,
-                "frame_%06llu",
+                "%s%06llu",
+                kFramePrefix,
                 static_cast<unsigned long long>(number));
   return name;
+}
+
+void
+makeFrameFolder(const std::string& folder)
+{
+  makeFolder(folder);
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    if (entry.path().filename().string().rfind(kFramePrefix, 0) == 0)
+      throw std::runtime_error(folder + ": holds frames already");
 }
 
 FrameRecorder::FrameRecorder(std::string folder, bool frames_can_wait)
 : folder_(std::move(folder)), frames_can_wait_(frames_can_wait)
 {
-  makeFolder(folder_);
-  if (std::filesystem::exists(folder_ + "/" + frameName(1) + ".pcd"))
-    throw std::runtime_error(folder_ + ": holds frames already");
+  makeFrameFolder(folder_);
   thread_ = std::thread([this] { write(); });
 }
 
@@ -63,11 +73,12 @@ FrameRecorder::push(const RangeFrame::ConstPtr& frame)
     changed_.wait(lock,
                   [this] { return waiting_.size() < kMostWaiting || !error_.empty(); });
   throwError();
+  ++pushed_;
   if (waiting_.size() >= kMostWaiting) {
     ++dropped_;
     return;
   }
-  waiting_.push_back(frame);
+  waiting_.emplace_back(pushed_, frame);
   changed_.notify_all();
 }
 
@@ -94,17 +105,16 @@ FrameRecorder::write()
     changed_.wait(lock, [this] { return over_ || !waiting_.empty(); });
     if (waiting_.empty())
       return;
-    const RangeFrame::ConstPtr frame = waiting_.front();
+    const auto [number, frame] = waiting_.front();
     lock.unlock();
     std::string error;
     try {
-      saveCloud(folder_ + "/" + frameName(written_ + 1) + ".pcd", frame->cloud);
+      saveCloud(folder_ + "/" + frameName(number) + ".pcd", frame->cloud);
     }
     catch (const std::exception& failure) {
       error = failure.what();
     }
     lock.lock();
-    ++written_;
     error_ = error;
     waiting_.pop_front();
     changed_.notify_all();

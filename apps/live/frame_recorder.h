@@ -9,18 +9,23 @@
 #include <mutex>
 #include <string>
 #include <thread>
+#include <utility>
 
 namespace holdfast {
 
 /// "frame_000017".
 std::string frameName(std::uint64_t number);
 
+/// Makes a folder for frames. \throw std::runtime_error "FOLDER: cause" when it cannot
+/// be made, or holds frames already, which the new ones would mix with.
+void makeFrameFolder(const std::string& folder);
+
 /// Writes frames as FOLDER/frame_000001.pcd and so on, each whole or not at all, on a
 /// thread of its own. When the disk is slower than the camera, frames are dropped and
-/// counted, or waited for where they can wait.
+/// counted, their numbers left out, or waited for where they can wait.
 class FrameRecorder {
 public:
-  /// \throw std::runtime_error "FOLDER: cause" when it cannot be made, or holds frames.
+  /// \throw std::runtime_error as makeFrameFolder().
   FrameRecorder(std::string folder, bool frames_can_wait);
   ~FrameRecorder();
   FrameRecorder(const FrameRecorder&) = delete;
@@ -42,9 +47,9 @@ private:
   const bool frames_can_wait_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  std::deque<RangeFrame::ConstPtr> waiting_;
+  std::deque<std::pair<std::uint64_t, RangeFrame::ConstPtr>> waiting_; ///< by number
   bool over_ = false;
-  std::uint64_t written_ = 0;
+  std::uint64_t pushed_ = 0;
   std::uint64_t dropped_ = 0;
   std::string error_;
   std::thread thread_; ///< the last, so that it finds everything else in place

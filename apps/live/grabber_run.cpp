@@ -2,6 +2,9 @@
 
 #include "console.h"
 
+#include <array>
+#include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <csignal>
 #include <exception>
@@ -12,15 +15,14 @@
 namespace holdfast {
 namespace {
 
-/// How often this thread looks after the grabber's.
-constexpr std::chrono::milliseconds kIdlePeriod{50};
-
-volatile std::sig_atomic_t interrupted = 0;
+/// Atomic, since a signal may come to any thread.
+std::atomic<bool> interrupted{false};
+static_assert(std::atomic<bool>::is_always_lock_free, "as signal handlers need it");
 
 extern "C" void
 noteInterrupt(int)
 {
-  interrupted = 1;
+  interrupted = true;
 }
 
 /// Turns the signals that end a program into a note; the second time they end it. A
@@ -29,10 +31,10 @@ class SignalGuard {
 public:
   SignalGuard()
   {
-    interrupted = 0;
+    interrupted = false;
     struct sigaction action {};
     action.sa_handler = noteInterrupt;
-    action.sa_flags = SA_RESETHAND;
+    action.sa_flags = SA_RESETHAND | SA_RESTART; // no write fails because of it
     ::sigaction(SIGINT, &action, &on_interrupt_);
     ::sigaction(SIGTERM, &action, &on_termination_);
     action.sa_handler = SIG_IGN;
@@ -51,6 +53,22 @@ private:
   struct sigaction on_interrupt_ {};
   struct sigaction on_termination_ {};
   struct sigaction on_pipe_ {};
+};
+
+/// Stops a grabber, so that none of its threads uses what is about to go, also when an
+/// exception is the reason.
+class StopGuard {
+public:
+  explicit StopGuard(Openni2Grabber& grabber) : grabber_(grabber) {}
+  ~StopGuard()
+  {
+    grabber_.stop();
+  }
+  StopGuard(const StopGuard&) = delete;
+  StopGuard& operator=(const StopGuard&) = delete;
+
+private:
+  Openni2Grabber& grabber_;
 };
 
 /// What the two threads tell each other.
@@ -127,7 +145,9 @@ std::vector<GrabberEvent>
 Run::wait()
 {
   std::unique_lock<std::mutex> lock(mutex_);
-  changed_.wait_for(lock, kIdlePeriod, [this] { return over_ || !events_.empty(); });
+  changed_.wait_for(lock, options_.idle_period, [this] {
+    return over_ || !events_.empty();
+  });
   return std::exchange(events_, {});
 }
 
@@ -148,7 +168,7 @@ tell(const GrabberEvent& event, const RunOptions& options)
     printError(event.message +
                (options.records_oni ? "; the recording ends here" : "") +
                (options.reconnects ? "; waiting for its return" : ""));
-    return options.reconnects;
+    return options.reconnects && !options.records_oni;
   case Kind::RecordingFailed:
   case Kind::CallbackFailed:
     break;
@@ -186,8 +206,9 @@ runGrabber(Openni2Grabber& grabber,
   StatusLine line(!options.quiet);
   const Stopwatch watch;
   bool well = true;
+  const StopGuard stop_at_exit(grabber);
   grabber.start();
-  while (!run.isOver() && grabber.isRunning() && interrupted == 0 && callbacks.idle() &&
+  while (!run.isOver() && grabber.isRunning() && !interrupted && callbacks.idle() &&
          (options.seconds <= 0.0 || watch.milliseconds() < 1e3 * options.seconds)) {
     well = tellAll(run.wait(), options, line) && well;
     line.show(callbacks.status());

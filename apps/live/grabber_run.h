@@ -4,6 +4,7 @@
 #include <holdfast/io/openni2_grabber.h>
 #include <holdfast/io/range_frame.h>
 
+#include <chrono>
 #include <functional>
 #include <string>
 
@@ -13,6 +14,7 @@ struct RunOptions {
   int frames = 0; ///< end after so many; 0: never
   double seconds = 0.0; ///< end after this time; 0: never
   bool quiet = false; ///< errors only
+  std::chrono::milliseconds idle_period{50}; ///< between two looks at the run
   bool reconnects = true; ///< the camera's return is waited for
   bool records_oni = false; ///< a recording that ends when the camera fails
 };
@@ -22,7 +24,7 @@ struct RunCallbacks {
   std::function<void(const RangeFrame::ConstPtr&)> frame;
   /// A line that says how it goes, on this thread.
   std::function<std::string()> status;
-  /// 20 times a second, on this thread. False ends the run.
+  /// Once per idle_period, on this thread. False ends the run.
   std::function<bool()> idle = [] { return true; };
 };
 

@@ -109,9 +109,11 @@ public:
     return statistics_;
   }
 
-  /// \return false when the user has closed the window.
-  bool updateView()
+  /// On the main thread. \return false when the user has closed the window.
+  bool onIdle()
   {
+    if (recording_)
+      recording_->checkDisk();
     return !view_ || view_->update();
   }
 
@@ -142,7 +144,7 @@ LiveSession::LiveSession(const LiveSettings& settings, Openni2Grabber& grabber)
 , extractor_(sensor_, settings.extraction.options)
 {
   if (!settings.output_folder.empty())
-    makeFolder(settings.output_folder);
+    makeFrameFolder(settings.output_folder);
   if (settings.view)
     view_.emplace();
   if (!settings.json_path.empty())
@@ -193,9 +195,11 @@ runLive(const CLI::App& command, LiveSettings& settings)
 {
   finishExtractionOptions(command, settings.extraction);
   settings.extraction.options.sampler.max_time_s = 1e-3 * settings.budget_ms;
-  settings.device.color = settings.view || !settings.record_path.empty();
   settings.run.reconnects = settings.device.reconnect;
+  if (settings.view)
+    settings.run.idle_period = std::chrono::milliseconds(15);
   settings.run.records_oni = isOniPath(settings.record_path);
+  settings.device.color = settings.view || settings.run.records_oni;
   Openni2Grabber grabber(settings.device);
   LiveSession session(settings, grabber);
   RunCallbacks callbacks;
@@ -204,7 +208,7 @@ runLive(const CLI::App& command, LiveSettings& settings)
     return session.statistics().pace() + ", " + session.statistics().work() + ", " +
            session.droppedText();
   };
-  callbacks.idle = [&session] { return session.updateView(); };
+  callbacks.idle = [&session] { return session.onIdle(); };
   const int exit_code = runGrabber(grabber, settings.run, callbacks);
   session.finish();
   if (!settings.run.quiet)
@@ -254,8 +258,8 @@ addLiveOptions(CLI::App& command, LiveSettings& settings)
   command
       .add_option("-o,--output",
                   settings.output_folder,
-                  "Write the patches of each frame as frame_000001.patches.json, .pcd "
-                  "and .ply here")
+                  "Write the patches of each frame that has any as "
+                  "frame_000001.patches.json, .pcd and .ply here")
       ->type_name("DIR")
       ->group("Output");
   command

@@ -44,6 +44,7 @@ Histogram::add(std::size_t number)
 {
   ++counts_[std::min(number, counts_.size() - 1)];
   ++total_;
+  largest_ = std::max(largest_, number);
 }
 
 std::size_t
@@ -51,12 +52,12 @@ Histogram::quantile(double share) const
 {
   const double wanted = share * static_cast<double>(total_);
   std::uint64_t seen = 0;
-  for (std::size_t number = 0; number < counts_.size(); ++number) {
+  for (std::size_t number = 0; number + 1 < counts_.size(); ++number) {
     seen += counts_[number];
     if (seen > 0 && static_cast<double>(seen) >= wanted)
       return number;
   }
-  return 0;
+  return largest_;
 }
 
 void

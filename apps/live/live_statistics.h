@@ -15,7 +15,7 @@ namespace holdfast {
 /// Counts of whole numbers, in memory that does not grow with them.
 class Histogram {
 public:
-  /// Numbers from `size` on count as size - 1.
+  /// Numbers from size - 1 on count as the largest of them.
   explicit Histogram(std::size_t size) : counts_(size, 0) {}
 
   void add(std::size_t number);
@@ -27,6 +27,7 @@ public:
 private:
   std::vector<std::uint64_t> counts_;
   std::uint64_t total_ = 0;
+  std::size_t largest_ = 0;
 };
 
 /// Frames, latencies, patches and memory of a run. Any thread may call.

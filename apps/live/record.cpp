@@ -40,15 +40,18 @@ int
 runRecord(RecordSettings& settings)
 {
   settings.run.records_oni = isOniPath(settings.output);
+  settings.device.color = settings.run.records_oni;
   // Nothing can be added to an .oni file that the camera's failure has ended.
   settings.device.reconnect = settings.device.reconnect && !settings.run.records_oni;
   settings.run.reconnects = settings.device.reconnect;
   Openni2Grabber grabber(settings.device);
   Recording recording(grabber, settings.output, settings.device.playback);
   LiveStatistics statistics;
+  // What the grabber drops is in an .oni file all the same.
   const auto dropped = [&] {
-    return std::to_string(recording.dropped() + grabber.statistics().dropped) +
-           " dropped";
+    const std::uint64_t by_grabber =
+        settings.run.records_oni ? 0 : grabber.statistics().dropped;
+    return std::to_string(recording.dropped() + by_grabber) + " dropped";
   };
   RunCallbacks callbacks;
   callbacks.frame = [&](const RangeFrame::ConstPtr& frame) {
@@ -56,6 +59,10 @@ runRecord(RecordSettings& settings)
     statistics.addFrame(frame->received);
   };
   callbacks.status = [&] { return statistics.pace() + ", " + dropped(); };
+  callbacks.idle = [&recording] {
+    recording.checkDisk();
+    return true;
+  };
   const int exit_code = runGrabber(grabber, settings.run, callbacks);
   recording.finish();
   if (!settings.run.quiet)

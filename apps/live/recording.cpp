@@ -1,8 +1,15 @@
 #include "recording.h"
 
 #include <filesystem>
+#include <stdexcept>
 
 namespace holdfast {
+namespace {
+
+/// Some frames and the end of a file.
+constexpr std::uintmax_t kEnoughBytes = 20'000'000;
+
+} // namespace
 
 bool
 isOniPath(const std::string& path)
@@ -13,7 +20,7 @@ isOniPath(const std::string& path)
 Recording::Recording(Openni2Grabber& grabber,
                      const std::string& path,
                      Playback playback)
-: grabber_(grabber)
+: grabber_(grabber), path_(path)
 {
   if (isOniPath(path))
     grabber_.startRecording(path);
@@ -26,6 +33,17 @@ Recording::push(const RangeFrame::ConstPtr& frame)
 {
   if (folder_)
     folder_->push(frame);
+}
+
+void
+Recording::checkDisk() const
+{
+  if (folder_)
+    return; // which checks every frame
+  std::error_code error;
+  const auto folder = std::filesystem::absolute(path_).parent_path();
+  if (std::filesystem::space(folder, error).available < kEnoughBytes && !error)
+    throw std::runtime_error(path_ + ": the disk is full, the recording ends here");
 }
 
 void

@@ -23,6 +23,10 @@ public:
   /// To be called for every frame. \throw std::runtime_error when the disk is full.
   void push(const RangeFrame::ConstPtr& frame);
 
+  /// To be called now and then: the recorder of OpenNI2 does not notice a full disk.
+  /// \throw std::runtime_error when there is no room left.
+  void checkDisk() const;
+
   /// \throw std::exception in one line when it is not complete.
   void finish();
 
@@ -31,6 +35,7 @@ public:
 
 private:
   Openni2Grabber& grabber_;
+  const std::string path_;
   std::unique_ptr<FrameRecorder> folder_; ///< null: an .oni file
 };
 

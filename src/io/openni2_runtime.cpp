@@ -9,6 +9,8 @@
 #include <cstdlib>
 #include <deque>
 #include <filesystem>
+#include <limits>
+#include <mutex>
 #include <thread>
 #include <utility>
 
@@ -20,12 +22,16 @@ namespace {
 
 class LastingThreads {
 public:
+  explicit LastingThreads(std::size_t most) : most_(most) {}
+
   void run(std::function<void()> job)
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     jobs_.push_back(std::move(job));
-    if (jobs_.size() > idle_)
+    if (jobs_.size() > idle_ && threads_ < most_) {
+      ++threads_;
       std::thread([this] { work(); }).detach();
+    }
     else
       has_job_.notify_one();
   }
@@ -51,6 +57,8 @@ private:
   std::mutex mutex_;
   std::condition_variable has_job_;
   std::deque<std::function<void()>> jobs_;
+  const std::size_t most_;
+  std::size_t threads_ = 0;
   std::size_t idle_ = 0;
 };
 
@@ -74,13 +82,6 @@ initializeOpenni2()
   static const openni::Status status = openni::OpenNI::initialize();
   if (status != openni::STATUS_OK)
     throw Openni2Error("OpenNI2 finds no driver" + lastOpenni2Error());
-}
-
-std::mutex&
-openni2Mutex()
-{
-  static std::mutex mutex;
-  return mutex;
 }
 
 bool
@@ -117,8 +118,15 @@ void
 runOnLastingThread(std::function<void()> job)
 {
   // Never destroyed: its threads wait in it to the end of the process.
-  static auto& threads = *new LastingThreads;
+  static auto& threads = *new LastingThreads(std::numeric_limits<std::size_t>::max());
   threads.run(std::move(job));
+}
+
+void
+runOnOpenni2Thread(std::function<void()> job)
+{
+  static auto& thread = *new LastingThreads(1);
+  thread.run(std::move(job));
 }
 
 } // namespace io

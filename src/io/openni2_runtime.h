@@ -50,21 +50,21 @@ std::string resolveDevice(const std::string& device);
 /// that has ended. So the threads are kept and lent to the next job.
 void runOnLastingThread(std::function<void()> job);
 
-/// OpenNI2 keeps its lists of devices and streams without locks in places.
-std::mutex& openni2Mutex();
+/// Runs a job on the one thread that all devices share.
+void runOnOpenni2Thread(std::function<void()> job);
 
-/// Does something with devices and streams on a lasting thread, one such job at a time,
-/// and waits for it. \return what the job returns. \throw what it throws.
+/// Does something with devices and streams, one such job at a time since OpenNI2 keeps
+/// its lists of them without locks in places, and waits for it. Always on the same
+/// thread: threads of OpenNI2 itself end, too, that of a recorder for one, and a new
+/// thread of ours would make it ask for them. \return what the job returns.
+/// \throw what it throws.
 template <typename Job>
 auto
 callOpenni2(Job job)
 {
   const auto task = std::make_shared<std::packaged_task<decltype(job())()>>(job);
   auto result = task->get_future();
-  runOnLastingThread([task] {
-    const std::lock_guard<std::mutex> lock(openni2Mutex());
-    (*task)();
-  });
+  runOnOpenni2Thread([task] { (*task)(); });
   return result.get();
 }
 

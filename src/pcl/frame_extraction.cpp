@@ -14,6 +14,9 @@ namespace {
 /// Some pixels see nothing, and some patches are turned down.
 constexpr int kSeedsPerPatch = 3;
 
+/// More than any image has pixels.
+constexpr int kMostPatches = 100'000'000;
+
 ExtractionOptions
 checked(ExtractionOptions options)
 {
@@ -22,7 +25,7 @@ checked(ExtractionOptions options)
   if (!error.empty())
     throw std::invalid_argument(error);
   if (sampler.max_seeds == 0)
-    sampler.max_seeds = kSeedsPerPatch * sampler.max_patches;
+    sampler.max_seeds = kSeedsPerPatch * std::min(sampler.max_patches, kMostPatches);
   if (sampler.max_seeds == 0)
     throw std::invalid_argument("a stream needs a number of seeds or patches");
   return options;
