@@ -134,7 +134,7 @@ sigmaTable(const NoiseReport& report)
       found.before_rounding.fixed);
   row("  fixed pattern: by difference", found.fixed_from_difference, {});
   row("step of the values", found.quantum, {});
-  row("across the rays, px of the image", found.sigma_point, {});
+  row("across the rays", found.sigma_point, {});
   return table;
 }
 
@@ -181,7 +181,8 @@ stepSentence(const NoiseReport& report)
 {
   const Estimate& step = report.found.quantum;
   if (!step.isKnown())
-    return "No step: the disparities take any value, or depths are rounded more "
+    return "No step is seen: the disparities take any value, or depths are rounded "
+           "more "
            "coarsely.";
   const double parts = std::max(1.0, std::round(1.0 / step.value));
   const double ratio = step.value * parts;

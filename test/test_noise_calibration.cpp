@@ -1,6 +1,5 @@
 #include <holdfast/sensor/noise_calibration.h>
 #include <holdfast/sensor/simulator.h>
-#include <holdfast/sensor/stereo_noise_model.h>
 
 #include "support/random.h"
 
@@ -16,19 +15,6 @@
 namespace holdfast { namespace {
 
 constexpr double kFocalTimesBaseline = 580.0 * 0.075; // px m
-
-/// As kinect_v1.yaml.
-Sensor
-kinect()
-{
-  Sensor sensor;
-  sensor.name = "kinect";
-  sensor.noise = std::make_shared<StereoNoiseModel>(StereoNoiseModel::Parameters{});
-  sensor.min_range_m = 0.5;
-  sensor.max_range_m = 8.0;
-  sensor.disparity_quantum_px = 0.125;
-  return sensor;
-}
 
 NoiseCalibrationOptions
 optionsFor(const Camera& camera)
@@ -111,6 +97,15 @@ planeFrames(int count, double sigma, const Field& pattern, test::Random& random)
   return frames;
 }
 
+/// For a single case, which an interval of 95 % misses now and then: four standard
+/// errors.
+bool
+isNear(const Estimate& estimate, double truth)
+{
+  const double half = 0.5 * (estimate.high - estimate.low);
+  return std::abs(estimate.value - truth) <= 2.0 * half;
+}
+
 /// Estimates of one figure with different seeds.
 class Tally {
 public:
@@ -122,15 +117,16 @@ public:
     hits_ += estimate.contains(truth_);
   }
 
-  /// With 95 % intervals, fewer than 8 of 10 have probability 0.012.
+  /// With 95 % intervals, fewer than 16 of 20 have probability 0.003, fewer than 8 of
+  /// 10 have 0.012.
   void expectCovered() const
   {
-    EXPECT_EQ(values_.size(), 10u);
-    EXPECT_GE(hits_, 8) << name_;
+    EXPECT_GE(hits_, 0.8 * static_cast<double>(values_.size())) << name_;
   }
 
-  /// Of the mean of ten, four standard errors are exceeded with probability 0.003.
-  void expectUnbiased() const
+  /// Of the mean of twenty, four standard errors are exceeded with probability 0.0008.
+  /// \param bias allowed for what is known to be neglected.
+  void expectUnbiased(double bias = 0.0) const
   {
     const auto n = static_cast<double>(values_.size());
     double mean = 0.0, squares = 0.0;
@@ -140,13 +136,13 @@ public:
       squares += std::pow(value - mean, 2);
     const double error = std::sqrt(squares / (n - 1.0) / n);
     // 1e-6: the step is found exactly, but for the single precision of the points.
-    EXPECT_NEAR(mean, truth_, 4.0 * error + 1e-6) << name_;
+    EXPECT_NEAR(mean, truth_, 4.0 * error + bias + 1e-6) << name_;
   }
 
-  void expectRight() const
+  void expectRight(double bias = 0.0) const
   {
     expectCovered();
-    expectUnbiased();
+    expectUnbiased(bias);
   }
 
 private:
@@ -156,72 +152,74 @@ private:
   int hits_ = 0;
 };
 
-/// Frames of a simulated scene, each time with fresh noise.
+// What the sensor below has: that of kinect_v1.yaml.
+constexpr double kSigmaDisparity = 0.17; // px
+constexpr double kSigmaPoint = 0.35; // px
+constexpr double kQuantum = 0.125; // px
+
+/// A scene as a sensor sees it whose errors are those of the stereo model exactly: the
+/// library's own simulator draws them in depth, to first order, which at 4 m makes the
+/// variance of the disparity 0.2 % larger.
 class SimulatedScene {
 public:
-  SimulatedScene(const std::string& scene, bool quantize)
-  : sensor_(kinect()), quantize_(quantize)
-  {
-    image_ = castRays(makeScene(scene),
-                      pixelRays(sensor_.camera),
-                      sensor_.min_range_m,
-                      sensor_.max_range_m);
-    attachNoise(image_, *sensor_.noise);
-  }
+  explicit SimulatedScene(const std::string& scene)
+  : image_(castRays(makeScene(scene), pixelRays(Camera{}), 0.5, 8.0))
+  {}
 
+  /// \param quantize whether disparities come in steps.
   /// \param pattern added to the disparities before they are rounded, if not empty.
-  std::vector<PointImage> frames(int count, const Field& pattern, test::Random& random)
+  std::vector<PointImage> frames(int count,
+                                 bool quantize,
+                                 const Field& pattern,
+                                 test::Random& random) const
   {
     std::vector<PointImage> frames;
     for (int t = 0; t < count; ++t) {
-      drawNoise(image_.truth, image_.roots, random.engine(), image_.points);
-      addPattern(pattern);
-      if (quantize_)
-        quantizeDisparity(image_, sensor_);
       PointImage& frame = frames.emplace_back();
       frame.width = image_.width;
       frame.height = image_.height;
-      for (const Eigen::Vector3d& q : image_.points)
-        frame.points.push_back(image_.sensor_pose.toLocal(q).cast<float>());
+      for (std::size_t i = 0; i < image_.truth.size(); ++i)
+        frame.points.push_back(measured(image_.sensor_pose.toLocal(image_.truth[i]),
+                                        pattern.empty() ? 0.0 : pattern[i],
+                                        quantize,
+                                        random)
+                                   .cast<float>());
     }
     return frames;
   }
 
-  NoiseCalibrationOptions options() const
-  {
-    return optionsFor(sensor_.camera);
-  }
-
 private:
-  void addPattern(const Field& pattern)
+  static Eigen::Vector3d measured(const Eigen::Vector3d& q,
+                                  double pattern,
+                                  bool quantize,
+                                  test::Random& random)
   {
-    for (std::size_t i = 0; i < pattern.size(); ++i) {
-      const Eigen::Vector3d q = image_.sensor_pose.toLocal(image_.points[i]);
-      const double d = kFocalTimesBaseline / q.z();
-      image_.points[i] = image_.sensor_pose.toWorld(q * (d / (d + pattern[i])));
-    }
+    double d = kFocalTimesBaseline / q.z() + pattern;
+    d += kSigmaDisparity * random.normal();
+    if (quantize)
+      d = std::round(d / kQuantum) * kQuantum;
+    const double z = kFocalTimesBaseline / d;
+    const double x = q.x() / q.z() + kSigmaPoint / 580.0 * random.normal();
+    const double y = q.y() / q.z() + kSigmaPoint / 580.0 * random.normal();
+    return {x * z, y * z, z};
   }
 
-  Sensor sensor_;
-  bool quantize_;
   RangeImage image_;
 };
 
-constexpr double kSigmaDisparity = 0.17; // what the simulated sensor has, px
-constexpr double kSigmaPoint = 0.35;
-
-/// Ten seeds of a scene; checks all that must be found in any.
+/// Twenty cases of a scene, every other one quantized; checks all that must be found.
 void
-checkScene(const std::string& name, bool quantize, bool has_planes)
+checkScene(const std::string& name, bool has_planes)
 {
-  SimulatedScene scene(name, quantize);
+  const SimulatedScene scene(name);
   Tally single("single", kSigmaDisparity), temporal("temporal", kSigmaDisparity),
-      point("point", kSigmaPoint), quantum("quantum", 0.125), fixed("fixed", 0.0),
+      point("point", kSigmaPoint), quantum("quantum", kQuantum), fixed("fixed", 0.0),
       exponent("exponent", 0.0);
-  for (std::uint64_t seed = 0; seed < 10; ++seed) {
-    test::Random random(seed);
+  for (std::uint64_t i = 0; i < 20; ++i) {
+    test::Random random(i);
+    const bool quantize = i % 2 == 1;
     const NoiseCalibration found =
-        calibrateNoise(scene.frames(3, {}, random), scene.options());
+        calibrateNoise(scene.frames(3, quantize, {}, random), optionsFor(Camera{}));
     ASSERT_EQ(found.status, NoiseCalibrationStatus::Ok);
     EXPECT_EQ(found.planes > 0, has_planes);
     EXPECT_EQ(found.quantum.isKnown(), quantize);
@@ -234,62 +232,52 @@ checkScene(const std::string& name, bool quantize, bool has_planes)
     if (quantize)
       quantum.add(found.quantum);
   }
-  single.expectRight();
+  // Curvature that adds a quarter to the variance of a spot, some of which noise may
+  // have hidden, adds 1/256 of that to the variance of its tiles.
+  single.expectRight(has_planes ? 0.0 : 0.125 / 256.0 * kSigmaDisparity);
   temporal.expectRight();
   point.expectRight();
   exponent.expectRight();
   fixed.expectCovered(); // being positive, it cannot be unbiased at zero
-  if (quantize)
-    quantum.expectUnbiased();
+  quantum.expectUnbiased();
 }
 
-TEST(NoiseCalibration, FindsWhatWasPutIntoATable)
+TEST(NoiseCalibration, FindsWhatWasPutIntoTheTable)
 {
-  checkScene("table", false, true);
+  checkScene("table", true);
 }
 
-TEST(NoiseCalibration, FindsWhatWasPutIntoAQuantizedTable)
+TEST(NoiseCalibration, FindsWhatWasPutIntoTheRocks)
 {
-  checkScene("table", true, true);
+  checkScene("rocks", false);
 }
 
-TEST(NoiseCalibration, FindsWhatWasPutIntoRocks)
-{
-  checkScene("rocks", false, false);
-}
-
-TEST(NoiseCalibration, FindsWhatWasPutIntoQuantizedRocks)
-{
-  checkScene("rocks", true, false);
-}
-
-TEST(NoiseCalibration, TellsAFixedPatternFromNoise)
+TEST(NoiseCalibration, TellsTheFixedPatternFromNoise)
 {
   constexpr double kPattern = 0.12;
-  for (const bool quantize : {false, true}) {
-    SCOPED_TRACE(quantize);
-    SimulatedScene scene("table", quantize);
-    Tally single("single", std::hypot(kSigmaDisparity, kPattern)),
-        temporal("temporal", kSigmaDisparity), fixed("fixed", kPattern);
-    for (std::uint64_t seed = 0; seed < 10; ++seed) {
-      test::Random random(seed);
-      const Field pattern = smoothField(640, 480, 3, kPattern, random);
-      const NoiseCalibration found =
-          calibrateNoise(scene.frames(3, pattern, random), scene.options());
-      const DisparitySigmas& sigmas = quantize ? found.before_rounding : found.sigmas;
-      single.add(sigmas.single);
-      temporal.add(sigmas.temporal);
-      fixed.add(sigmas.fixed);
-      // Both come from the same residuals.
-      EXPECT_NEAR(found.sigmas.fixed.value, found.fixed_from_difference.value, 1e-3);
-    }
-    single.expectRight();
-    temporal.expectRight();
-    fixed.expectRight();
+  const SimulatedScene scene("table");
+  Tally single("single", std::hypot(kSigmaDisparity, kPattern)),
+      temporal("temporal", kSigmaDisparity), fixed("fixed", kPattern);
+  for (std::uint64_t i = 0; i < 20; ++i) {
+    test::Random random(i);
+    const bool quantize = i % 2 == 1;
+    const Field pattern = smoothField(640, 480, 3, kPattern, random);
+    const NoiseCalibration found =
+        calibrateNoise(scene.frames(3, quantize, pattern, random),
+                       optionsFor(Camera{}));
+    const DisparitySigmas& sigmas = quantize ? found.before_rounding : found.sigmas;
+    single.add(sigmas.single);
+    temporal.add(sigmas.temporal);
+    fixed.add(sigmas.fixed);
+    // Both come from the same residuals.
+    EXPECT_NEAR(found.sigmas.fixed.value, found.fixed_from_difference.value, 1e-3);
   }
+  single.expectRight();
+  temporal.expectRight();
+  fixed.expectRight();
 }
 
-TEST(NoiseCalibration, IntervalsCoverInNineteenOfTwentyCases)
+TEST(NoiseCalibration, IntervalsHoldTheTruthInNineteenOfTwentyCases)
 {
   constexpr int kTrials = 200;
   constexpr double kPattern = 0.1, kSigma = 0.06;
@@ -319,25 +307,25 @@ TEST(NoiseCalibration, IntervalsCoverInNineteenOfTwentyCases)
 
 TEST(NoiseCalibration, SmallRegionsTakeLongWavesIntoTheirPlanes)
 {
-  test::Random random;
-  const Field pattern = smoothField(160, 120, 15, 0.2, random);
-  const NoiseCalibration found =
-      calibrateNoise(planeFrames(3, 0.05, pattern, random), optionsFor(smallCamera()));
-  ASSERT_GE(found.by_region_size.size(), 4u);
-  for (std::size_t i = 1; i < 3; ++i) // up to 32 px, the length of the waves
-    EXPECT_GT(found.by_region_size[i].single.value,
-              1.1 * found.by_region_size[i - 1].single.value);
-  EXPECT_EQ(found.by_region_size.back().size_px, 0);
-  EXPECT_EQ(found.by_region_size.back().single.value, found.sigmas.single.value);
+  for (std::uint64_t i = 0; i < 5; ++i) {
+    test::Random random(i);
+    // Higher waves would bend so small a plane that it could be a curved surface.
+    const Field waves = smoothField(160, 120, 15, 0.03, random);
+    const std::vector<PointImage> frames = planeFrames(3, 0.01, waves, random);
+    NoiseCalibrationOptions options = optionsFor(smallCamera());
+    const NoiseCalibration found = calibrateNoise(frames, options);
+    ASSERT_GE(found.by_region_size.size(), 4u);
+    for (std::size_t k = 1; k < 3; ++k) // up to 32 px, the length of the waves
+      EXPECT_GT(found.by_region_size[k].single.value,
+                1.1 * found.by_region_size[k - 1].single.value);
+    EXPECT_EQ(found.by_region_size.back().size_px, 0);
+    EXPECT_EQ(found.by_region_size.back().single.value, found.sigmas.single.value);
 
-  NoiseCalibrationOptions options = optionsFor(smallCamera());
-  options.region_px = 16;
-  test::Random again;
-  const Field same = smoothField(160, 120, 15, 0.2, again);
-  const NoiseCalibration small =
-      calibrateNoise(planeFrames(3, 0.05, same, again), options);
-  EXPECT_EQ(small.region_px, 16);
-  EXPECT_EQ(small.sigmas.single.value, found.by_region_size[1].single.value);
+    options.region_px = 16;
+    const NoiseCalibration small = calibrateNoise(frames, options);
+    EXPECT_EQ(small.region_px, 16);
+    EXPECT_EQ(small.sigmas.single.value, found.by_region_size[1].single.value);
+  }
 }
 
 TEST(NoiseCalibration, LeavesOutWhatMovedAndDropouts)
@@ -359,14 +347,18 @@ TEST(NoiseCalibration, LeavesOutWhatMovedAndDropouts)
   const NoiseCalibration found = calibrateNoise(frames, optionsFor(camera));
   ASSERT_EQ(found.planes, 1);
   EXPECT_GT(found.pixels, 0.9 * 160 * 120);
-  EXPECT_TRUE(found.sigmas.temporal.contains(0.05)) << found.sigmas.temporal.value;
-  EXPECT_TRUE(found.sigmas.single.contains(0.05)) << found.sigmas.single.value;
-  EXPECT_EQ(found.sigmas.fixed.low, 0.0);
+  EXPECT_TRUE(isNear(found.sigmas.temporal, 0.05)) << found.sigmas.temporal.value;
+  EXPECT_TRUE(isNear(found.sigmas.single, 0.05)) << found.sigmas.single.value;
 }
 
-/// The plane with steps of the disparity and of the depth; 0: none.
+/// Two frames of disparities with noise, rounded to steps of the disparity and then of
+/// the depth; 0: none.
 std::vector<PointImage>
-steppedFrames(double quantum_px, double depth_step_m, test::Random& random)
+steppedFrames(const std::function<double(int u, int v)>& disparity,
+              double sigma,
+              double quantum_px,
+              double depth_step_m,
+              test::Random& random)
 {
   const auto toSteps = [](double value, double step) {
     return step > 0.0 ? std::round(value / step) * step : value;
@@ -374,7 +366,7 @@ steppedFrames(double quantum_px, double depth_step_m, test::Random& random)
   std::vector<PointImage> frames;
   for (int t = 0; t < 2; ++t)
     frames.push_back(imageOf(smallCamera(), [&](int u, int v) {
-      const double d = planeDisparity(u, v) + 0.1 * random.normal();
+      const double d = disparity(u, v) + sigma * random.normal();
       return kFocalTimesBaseline /
              toSteps(kFocalTimesBaseline / toSteps(d, quantum_px), depth_step_m);
     }));
@@ -383,39 +375,112 @@ steppedFrames(double quantum_px, double depth_step_m, test::Random& random)
 
 TEST(NoiseCalibration, FindsStepsOfTheDisparity)
 {
-  for (const double quantum : {0.25, 0.125, 0.1, 1.0 / 16.0, 1.0 / 32.0}) {
-    SCOPED_TRACE(quantum);
-    test::Random random;
-    const NoiseCalibration found =
-        calibrateNoise(steppedFrames(quantum, 0.0, random), optionsFor(smallCamera()));
-    // Single precision of a depth of 1 m is 3e-6 px.
-    EXPECT_NEAR(found.quantum.value, quantum, 1e-5 * quantum);
-    EXPECT_TRUE(found.before_rounding.temporal.contains(0.1));
-  }
+  for (const double quantum : {1.0, 0.5, 0.25, 0.125, 0.1, 1.0 / 16.0, 1.0 / 32.0})
+    // In narrow steps, in wide ones, and where few values leave theirs.
+    for (const double sigma : {2.0 * quantum, 0.5 * quantum, 0.1 * quantum}) {
+      SCOPED_TRACE(quantum);
+      SCOPED_TRACE(sigma);
+      test::Random random;
+      const NoiseCalibration found =
+          calibrateNoise(steppedFrames(planeDisparity, sigma, quantum, 0.0, random),
+                         optionsFor(smallCamera()));
+      // Single precision of a depth of 1 m is 3e-6 px.
+      EXPECT_NEAR(found.quantum.value, quantum, 1e-5 * quantum + 1e-6);
+      EXPECT_TRUE(isNear(found.before_rounding.temporal, sigma))
+          << found.before_rounding.temporal.value;
+    }
+}
+
+TEST(NoiseCalibration, FindsStepsWithoutNoise)
+{
+  test::Random random;
+  const NoiseCalibration found =
+      calibrateNoise(steppedFrames(planeDisparity, 0.0, 0.125, 0.0, random),
+                     optionsFor(smallCamera()));
+  EXPECT_NEAR(found.quantum.value, 0.125, 1e-6);
+  EXPECT_EQ(found.sigmas.temporal.value, 0.0);
+  EXPECT_EQ(found.before_rounding.temporal.value, 0.0);
 }
 
 TEST(NoiseCalibration, FindsStepsBehindMillimetres)
 {
   test::Random random;
   const NoiseCalibration found =
-      calibrateNoise(steppedFrames(0.125, 1e-3, random), optionsFor(smallCamera()));
+      calibrateNoise(steppedFrames(planeDisparity, 0.1, 0.125, 1e-3, random),
+                     optionsFor(smallCamera()));
   // A millimetre, a third of a step, moves single values by some percent of a step, but
   // there are 300 of them.
   EXPECT_NEAR(found.quantum.value, 0.125, 1e-4);
-  EXPECT_TRUE(found.quantum.contains(0.125))
-      << found.quantum.low << ' ' << found.quantum.high;
+}
+
+/// A tilted plane between 0.6 and 1.4 m.
+double
+nearDisparity(int /*u*/, int v)
+{
+  return 32.0 + 43.0 / 119.0 * v;
+}
+
+TEST(NoiseCalibration, FindsStepsThatAreTheWiderOnesFarAway)
+{
+  // A millimetre is from a fifth of a step to a whole one.
+  test::Random random;
+  const NoiseCalibration found =
+      calibrateNoise(steppedFrames(nearDisparity, 0.05, 0.125, 1e-3, random),
+                     optionsFor(smallCamera()));
+  EXPECT_NEAR(found.quantum.value, 0.125, 1e-4);
 }
 
 TEST(NoiseCalibration, RoundedDepthsAreNoStepOfTheDisparity)
 {
-  for (const double depth_step : {0.0, 1e-3, 1e-4}) {
-    SCOPED_TRACE(depth_step);
-    test::Random random;
-    const NoiseCalibration found =
-        calibrateNoise(steppedFrames(0.0, depth_step, random),
-                       optionsFor(smallCamera()));
-    EXPECT_FALSE(found.quantum.isKnown()) << found.quantum.value;
-    EXPECT_FALSE(found.before_rounding.single.isKnown());
+  for (const auto& disparity : {planeDisparity, nearDisparity})
+    for (const double sigma : {0.02, 0.1})
+      for (const double depth_step : {0.0, 5e-3, 1e-3, 1e-4}) {
+        SCOPED_TRACE(sigma);
+        SCOPED_TRACE(depth_step);
+        test::Random random;
+        const NoiseCalibration found =
+            calibrateNoise(steppedFrames(disparity, sigma, 0.0, depth_step, random),
+                           optionsFor(smallCamera()));
+        ASSERT_EQ(found.status, NoiseCalibrationStatus::Ok);
+        EXPECT_FALSE(found.quantum.isKnown()) << found.quantum.value;
+        EXPECT_FALSE(found.before_rounding.single.isKnown());
+      }
+}
+
+TEST(NoiseCalibration, SaysNothingOfNoiseBehindTooFewSteps)
+{
+  test::Random random;
+  // A wall seen from the front: one step, one depth.
+  const auto wall = [](int u, int) { return 20.0 + 0.0005 * u; };
+  const NoiseCalibration found =
+      calibrateNoise(steppedFrames(wall, 0.04, 0.125, 0.0, random),
+                     optionsFor(smallCamera()));
+  EXPECT_EQ(found.planes, 1);
+  EXPECT_TRUE(found.quantum.isKnown());
+  EXPECT_TRUE(found.sigmas.single.isKnown());
+  EXPECT_FALSE(found.before_rounding.single.isKnown());
+  EXPECT_FALSE(found.depth_exponent.isKnown());
+}
+
+TEST(NoiseCalibration, AnyBaselineMeansTheSameDepths)
+{
+  test::Random random;
+  const std::vector<PointImage> frames =
+      steppedFrames(planeDisparity, 0.1, 0.125, 0.0, random);
+  NoiseCalibrationOptions options = optionsFor(smallCamera());
+  const NoiseCalibration found = calibrateNoise(frames, options);
+  for (const double factor : {1e-3, 0.1, 1.1, 1e3}) { // 1e3: mm for m
+    SCOPED_TRACE(factor);
+    NoiseCalibrationOptions other = options;
+    other.baseline_m *= factor;
+    const NoiseCalibration scaled = calibrateNoise(frames, other);
+    // Single precision of the disparities, 1e-5 of the step.
+    EXPECT_EQ(scaled.pixels, found.pixels);
+    for (const auto& [value, expected] :
+         {std::pair(scaled.quantum, found.quantum),
+          std::pair(scaled.sigmas.single, found.sigmas.single),
+          std::pair(scaled.before_rounding.temporal, found.before_rounding.temporal)})
+      EXPECT_NEAR(value.value, factor * expected.value, 1e-5 * factor);
   }
 }
 
@@ -433,7 +498,7 @@ TEST(NoiseCalibration, OneFrameHasNoTemporalPart)
   const NoiseCalibration found =
       calibrateNoise(planeFrames(1, 0.1, {}, random), optionsFor(smallCamera()));
   EXPECT_EQ(found.status, NoiseCalibrationStatus::Ok);
-  EXPECT_TRUE(found.sigmas.single.contains(0.1)) << found.sigmas.single.value;
+  EXPECT_TRUE(isNear(found.sigmas.single, 0.1)) << found.sigmas.single.value;
   EXPECT_FALSE(found.sigmas.temporal.isKnown());
   EXPECT_FALSE(found.sigmas.fixed.isKnown());
   EXPECT_FALSE(found.fixed_from_difference.isKnown());
@@ -442,8 +507,8 @@ TEST(NoiseCalibration, OneFrameHasNoTemporalPart)
 TEST(NoiseCalibration, SeesNoiseThatGrowsWithTheDepth)
 {
   Tally exponent("exponent", 1.0);
-  for (std::uint64_t seed = 0; seed < 10; ++seed) {
-    test::Random random(seed);
+  for (std::uint64_t i = 0; i < 10; ++i) {
+    test::Random random(i);
     std::vector<PointImage> frames;
     for (int t = 0; t < 3; ++t)
       frames.push_back(imageOf(smallCamera(), [&](int u, int v) {
@@ -502,18 +567,18 @@ TEST(NoiseCalibration, RejectsMisuse)
 
 TEST(Rounding, VarianceIsThatOfSimulatedPairs)
 {
-  constexpr double kQuantum = 0.125;
+  constexpr double kStep = 0.125;
   constexpr int kPairs = 400000;
   std::uint64_t number = 0;
   for (const double ratio : {0.02, 0.099, 0.1, 0.2, 0.3, 0.5, 1.0, 3.0}) {
     SCOPED_TRACE(ratio);
     test::Random random(number++);
-    const double sigma = ratio * kQuantum;
+    const double sigma = ratio * kStep;
     double sum = 0.0, squares = 0.0;
     for (int i = 0; i < kPairs; ++i) {
-      const double phase = random.uniform(0.0, kQuantum);
+      const double phase = random.uniform(0.0, kStep);
       const auto reported = [&] {
-        return std::round((phase + sigma * random.normal()) / kQuantum) * kQuantum;
+        return std::round((phase + sigma * random.normal()) / kStep) * kStep;
       };
       const double first = reported();
       const double half = 0.5 * std::pow(first - reported(), 2);
@@ -522,8 +587,8 @@ TEST(Rounding, VarianceIsThatOfSimulatedPairs)
     }
     const double mean = sum / kPairs;
     const double error = std::sqrt((squares / kPairs - mean * mean) / kPairs);
-    EXPECT_NEAR(roundedTemporalVariance(sigma, kQuantum), mean, 4.0 * error);
-    EXPECT_NEAR(sigmaBeforeRounding(roundedTemporalVariance(sigma, kQuantum), kQuantum),
+    EXPECT_NEAR(roundedTemporalVariance(sigma, kStep), mean, 4.0 * error);
+    EXPECT_NEAR(sigmaBeforeRounding(roundedTemporalVariance(sigma, kStep), kStep),
                 sigma,
                 1e-9);
   }

@@ -105,9 +105,11 @@ struct NoiseCalibration {
   /// fixed pattern as the difference sqrt(single^2 - temporal^2). It agrees with
   /// sigmas.fixed when scene and sensor rested.
   Estimate fixed_from_difference;
-  /// The step in which disparities are reported, px; NaN where there is none.
+  /// The step in which disparities are reported, px; NaN where there is none. Depths
+  /// rounded as well shift it by more than the interval says when they hardly differ.
   Estimate quantum;
-  /// Sigmas before the disparities were rounded to that step; NaN without one.
+  /// Sigmas before the disparities were rounded to that step; NaN without one, and
+  /// where the disparities of the surfaces spread over less than a few steps.
   DisparitySigmas before_rounding;
   /// Scatter of the points across the nominal rays of their pixels, in one image
   /// direction, px; NaN where the points lie on these rays, so that nothing can be said
@@ -116,16 +118,17 @@ struct NoiseCalibration {
 
   std::vector<RegionSizeRow> by_region_size;
   std::vector<DepthRow> by_depth; ///< from near to far
-  /// p in single ~ z^p, at the mean depth: 0 where the disparity noise is constant.
+  /// p in single ~ z^p, linearised at the mean depth: 0 where the disparity noise is
+  /// constant; NaN where the depths hardly differ.
   Estimate depth_exponent;
 };
 
 /// Measures all that the frames can tell. Surfaces count as flat when their radius of
 /// curvature is 4 m or more. Pixels that saw something else in single frames, dropouts
 /// and edges are left out: values away from the median of their pixel by more than ten
-/// typical temporal sigmas and 0.25 px, pixels with less than half of the frames, and
-/// 8 x 8 tiles that are not there by three quarters or whose variance, in space or
-/// time, is four times that of the tiles at their depth.
+/// typical changes between frames, pixels with less than half of the frames, and 8 x 8
+/// tiles that are not there by three quarters or whose variance, in space or time, is
+/// four times that of the tiles at their depth.
 ///
 /// The planes are fitted over the pixels, not over the measured rays: scatter across
 /// the rays, which would add (a^2 + b^2) sigma_point^2 to the residual, does not enter

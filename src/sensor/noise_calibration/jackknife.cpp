@@ -1,4 +1,4 @@
-#include "noise_calibration_jackknife.h"
+#include "jackknife.h"
 
 #include <boost/math/distributions/students_t.hpp>
 

@@ -1,4 +1,4 @@
-#include "noise_calibration_regions.h"
+#include "regions.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -36,7 +36,7 @@ momentsOf(const TileImage& image, const Region& region)
 {
   PlaneMoments sum;
   for (const int i : region)
-    sum += image.tiles[static_cast<std::size_t>(i)].mean;
+    sum += image[i].mean;
   return sum;
 }
 
@@ -56,7 +56,7 @@ findSeeds(const TileImage& image, double largest_ratio)
       double squares = 0.0, dof = 0.0;
       for (int k = 0; k < kSeedTiles * kSeedTiles; ++k) {
         const int i = image.index(column + k % kSeedTiles, row + k / kSeedTiles);
-        const Tile& tile = image.tiles[static_cast<std::size_t>(i)];
+        const Tile& tile = image[i];
         if (!tile.usable)
           break;
         seed.tiles.push_back(i);
@@ -87,7 +87,7 @@ forEachNeighbor(const TileImage& image, int index, Use&& use)
       use(image.index(u, v));
 }
 
-/// The tiles of a region, and those beside it, that lie on its plane.
+/// The tiles that lie on the plane of a region, in one piece with it.
 Region
 regrown(const TileImage& image,
         const std::vector<bool>& taken,
@@ -109,23 +109,24 @@ regrown(const TileImage& image,
       next.push_back(index);
   };
   for (const int index : region)
-    forEachNeighbor(image, index, consider);
+    consider(index);
+  for (std::size_t k = 0; k < next.size(); ++k)
+    forEachNeighbor(image, next[k], consider);
   std::sort(next.begin(), next.end());
   return next;
 }
 
-/// Grows a seed ring by ring until nothing changes.
+/// Grows a seed, with ever better planes, until it grows no more.
 Region
 grow(const TileImage& image, const std::vector<bool>& taken, const Seed& seed)
 {
   const double largest_sigma = kLargestSigmaGrowth * std::sqrt(seed.variance);
   Region region = seed.tiles;
-  for (int ring = 0; ring < image.columns + image.rows; ++ring) {
+  for (bool grows = true; grows;) {
     Region next = regrown(image, taken, region, largest_sigma);
     if (next.size() < seed.tiles.size())
       return {};
-    if (next == region)
-      break;
+    grows = next.size() > region.size();
     region = std::move(next);
   }
   return region;
@@ -148,7 +149,7 @@ curvatureOf(const TileImage& image,
   Vector6d b = Vector6d::Zero();
   const Eigen::Vector3d middle = momentsOf(image, region).mean;
   for (const int i : region) {
-    const PlaneMoments& tile = image.tiles[static_cast<std::size_t>(i)].mean;
+    const PlaneMoments& tile = image[i].mean;
     const Eigen::Vector3d q = tile.mean - middle;
     const double x = q.x() / options.camera.fx, y = q.y() / options.camera.fy;
     Vector6d terms;

@@ -1,7 +1,7 @@
 /// \file The frames of a noise calibration, cut into tiles of 8 x 8 pixels.
 #pragma once
 
-#include "noise_calibration_moments.h"
+#include "plane_moments.h"
 
 #include <holdfast/sensor/noise_calibration.h>
 
@@ -24,14 +24,31 @@ struct Tile {
   double scatter_dof = 0.0;
 };
 
+/// The image is cut into so many cells, whose tiles are left out together where an
+/// interval is wanted: the pattern of neighbouring pixels is not independent.
+inline constexpr int kCellColumns = 8;
+inline constexpr int kCellRows = 6;
+
 struct TileImage {
   int columns = 0;
   int rows = 0;
   std::vector<Tile> tiles; ///< row by row
 
+  const Tile& operator[](int index) const
+  {
+    return tiles[static_cast<std::size_t>(index)];
+  }
+
   int index(int column, int row) const
   {
     return row * columns + column;
+  }
+
+  /// Number of the cell of a tile, row by row.
+  int cellOf(int index) const
+  {
+    return index / columns * kCellRows / rows * kCellColumns +
+           index % columns * kCellColumns / columns;
   }
 };
 
@@ -67,8 +84,8 @@ private:
   };
 
   Spread spreadOf(int u, int v) const;
-  double typicalTemporalSigma() const;
-  void dropWhatMoved(double limit_px);
+  float typicalChange() const;
+  void dropWhatMoved();
   void addPixel(int u, int v, Tile& tile) const;
   void addScatter(const PointImage& image,
                   int column,

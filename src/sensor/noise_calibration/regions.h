@@ -1,7 +1,7 @@
 /// \file Flat parts of a scene, found without being told where.
 #pragma once
 
-#include "noise_calibration_tiles.h"
+#include "tiles.h"
 
 #include <vector>
 

@@ -1,6 +1,6 @@
-#include "noise_calibration_step.h"
+#include "step.h"
 
-#include "noise_calibration_jackknife.h"
+#include "jackknife.h"
 
 #include <holdfast/geometry/constants.h>
 
@@ -14,20 +14,28 @@ namespace {
 // Between the pixels of a difference, px.
 constexpr int kLag = 4;
 
-// Enough for a characteristic function to about 0.01.
-constexpr std::size_t kMostValues = 10000;
+// Enough for a characteristic function to 0.01, and too few for one.
+constexpr std::size_t kMostValues = 5000;
+constexpr std::size_t kLeastValues = 100;
 
 // From the lowest point of the characteristic function to its return. Without a step
-// there is none; rounding of the depths to millimetres, 1 m away,
-// leaves 0.4 of it.
+// there is none; rounding of the depths to millimetres, 1 m away, leaves 0.4 of it.
 constexpr double kLeastRise = 0.25;
 
-// Strength of a comb that explains all values.
-constexpr double kExact = 0.9;
+// More than what a frequency between two of those tried takes from the strength.
+constexpr double kClearlyStronger = 0.01;
+
+// Of the differences, which are twice the noise, over the step: finer steps add less
+// than 1/192 of the variance of the noise.
+constexpr double kMostSteps = 8.0;
+
+// Differences below are none, but for the single precision of the points.
+constexpr double kSinglePrecision = 1e-6;
 
 /// Multiples of one number, as far as there is one.
 struct Comb {
-  double step = 0.0; ///< 0: none
+  double frequency = 0.0; ///< the inverse of that number; 0: none
+  double resolution = 0.0; ///< of the frequency
   double strength = 0.0; ///< 1: all of them exactly
 };
 
@@ -72,27 +80,28 @@ characteristic(const std::vector<double>& values, double frequency)
 /// analysis of amplitude-quantized sampled-data systems", 1961): having fallen, it
 /// comes back to 1 at the frequency 1/step. That of noise alone falls and stays down.
 Comb
-findComb(const std::vector<double>& values, double least_step, double largest_step)
+findComb(const std::vector<double>& values)
 {
   Comb comb;
   double squares = 0.0;
   for (const double value : values)
     squares += value * value;
-  if (squares == 0.0)
+  if (values.size() < kLeastValues)
     return comb;
-  // Fine enough for peaks as wide as the values are spread, in 1/40 of their width.
-  const double resolution =
-      0.025 / std::sqrt(squares / static_cast<double>(values.size()));
-  double lowest = 1.0, first = 1.0 / least_step;
-  for (double f = 1.0 / largest_step; f <= std::min(1.0 / least_step, 1.4 * first);
-       f += resolution) {
+  const double rms = std::sqrt(squares / static_cast<double>(values.size()));
+  // Peaks are as wide as the values are narrow.
+  comb.resolution = 0.025 / rms;
+  double lowest = 1.0;
+  for (double f = comb.resolution; f <= kMostSteps / rms; f += comb.resolution) {
     const double value = characteristic(values, f);
     lowest = std::min(lowest, value);
-    if (value - lowest < kLeastRise || value <= comb.strength)
-      continue;
-    // The peak is not far behind the first frequency that is high enough.
-    first = std::min(first, f);
-    comb = {1.0 / f, value};
+    if (value > comb.strength && value - lowest >= kLeastRise) {
+      comb.frequency = f;
+      comb.strength = value;
+    }
+    // Behind the first peak come its multiples.
+    if (comb.frequency > 0.0 && value < 0.5 * (comb.strength + lowest))
+      break;
   }
   return comb;
 }
@@ -117,6 +126,7 @@ forEachPixel(const DisparityStack& stack,
 
 /// Differences of differences, d00 - d10 - d01 + d11, at the corners of squares within
 /// tiles: integer combinations keep to the steps, and the slope of a plane drops out.
+/// Differences of zero are a multiple of every step.
 /// \param value maps a disparity to what is compared.
 template <typename Value>
 std::vector<double>
@@ -133,7 +143,7 @@ crossDifferences(const DisparityStack& stack,
       return value(static_cast<double>(stack.disparity(frame, u + du, v + dv)));
     };
     const double cross = at(0, 0) - at(kLag, 0) - at(0, kLag) + at(kLag, kLag);
-    if (std::isfinite(cross))
+    if (std::abs(cross) > kSinglePrecision * at(0, 0)) // not for NaN
       differences.add(cross);
   });
   return differences.values();
@@ -163,15 +173,16 @@ phasor(const std::vector<double>& values, double frequency)
   return sum;
 }
 
-/// The frequency of the longest phasor near the one given: the disparities themselves
+/// The frequency of the longest phasor about that of a comb: the disparities themselves
 /// span many more steps than their differences and are that much more precise.
 double
-sharpened(const std::vector<double>& values, double frequency)
+sharpened(const std::vector<double>& values, const Comb& comb)
 {
   const auto [low, high] = std::minmax_element(values.begin(), values.end());
-  const double resolution = 0.1 / std::max(*high - *low, 1.0);
-  double best = frequency, longest = 0.0;
-  for (double f = 0.9 * frequency; f <= 1.1 * frequency; f += resolution) {
+  const double width = 2.0 * comb.resolution;
+  const double resolution = std::min(0.1 / (*high - *low), width);
+  double best = comb.frequency, longest = 0.0;
+  for (double f = best - width; f <= comb.frequency + width; f += resolution) {
     const double length = std::abs(phasor(values, f));
     if (length > longest) {
       longest = length;
@@ -197,14 +208,12 @@ Estimate
 regress(const DisparityStack& stack,
         const TileImage& image,
         const std::vector<Region>& regions,
-        const std::vector<int>& cells,
         const Steps& steps,
         double middle) ///< a disparity; sums about it lose no digits
 {
   enum { N, K, KK, D, KD, kSums };
-  std::vector<CellSums> sums(
-      1 + static_cast<std::size_t>(*std::max_element(cells.begin(), cells.end())),
-      {0.0, Eigen::ArrayXd::Zero(kSums)});
+  std::vector<CellSums> cells(kCellColumns * kCellRows,
+                              {0.0, Eigen::ArrayXd::Zero(kSums)});
   const double middle_number = steps.numberOf(middle);
   forEachPixel(stack, image, regions, [&](int tile, int frame, int u, int v) {
     const double disparity = stack.disparity(frame, u, v);
@@ -212,8 +221,7 @@ regress(const DisparityStack& stack,
       return;
     const double d = disparity - middle;
     const double k = steps.numberOf(disparity) - middle_number;
-    const int index = cells[static_cast<std::size_t>(tile)];
-    CellSums& cell = sums[static_cast<std::size_t>(index)];
+    CellSums& cell = cells[static_cast<std::size_t>(image.cellOf(tile))];
     cell.weight += 1.0;
     cell.sums[N] += 1.0;
     cell.sums[K] += k;
@@ -221,9 +229,34 @@ regress(const DisparityStack& stack,
     cell.sums[D] += d;
     cell.sums[KD] += k * d;
   });
-  return jackknife(sums, [](const Eigen::ArrayXd& s) {
+  return jackknife(cells, [](const Eigen::ArrayXd& s) {
     return (s[KD] - s[K] * s[D] / s[N]) / (s[KK] - s[K] * s[K] / s[N]);
   });
+}
+
+/// Depths rounded to a step of their own look like a comb of disparities near one
+/// depth, but farther away, where such steps are less than half as wide, only a comb
+/// that is none of their making is still the first.
+Comb
+findDisparityComb(const DisparityStack& stack,
+                  const TileImage& image,
+                  const std::vector<Region>& regions,
+                  double focal_times_baseline)
+{
+  const auto itself = [](double d) { return d; };
+  const auto depth = [=](double d) { return focal_times_baseline / d; };
+  const Comb comb = findComb(crossDifferences(stack, image, regions, itself));
+  if (comb.frequency == 0.0)
+    return comb;
+  const Comb rounding = findComb(crossDifferences(stack, image, regions, depth));
+  if (rounding.strength <= comb.strength + kClearlyStronger)
+    return comb;
+  const double farther_px =
+      std::sqrt(0.5 * focal_times_baseline * rounding.frequency / comb.frequency);
+  const Comb far = findComb(crossDifferences(stack, image, regions, [&](double d) {
+    return d < farther_px ? d : std::nan("");
+  }));
+  return far.frequency < 1.5 * comb.frequency ? far : Comb{};
 }
 
 } // namespace
@@ -232,34 +265,19 @@ Estimate
 findQuantum(const DisparityStack& stack,
             const TileImage& image,
             const std::vector<Region>& regions,
-            const std::vector<int>& cells,
             double focal_times_baseline)
 {
-  constexpr double kLeastPx = 1.0 / 64.0, kLargestPx = 1.0;
-  const auto itself = [](double d) { return d; };
-  const auto depth = [=](double d) { return focal_times_baseline / d; };
-  const Comb comb =
-      findComb(crossDifferences(stack, image, regions, itself), kLeastPx, kLargestPx);
-  if (comb.step == 0.0)
+  const Comb comb = findDisparityComb(stack, image, regions, focal_times_baseline);
+  if (comb.frequency == 0.0)
     return {};
-
   std::vector<double> disparities = someDisparities(stack, image, regions);
   Steps steps;
-  steps.frequency = sharpened(disparities, 1.0 / comb.step);
+  steps.frequency = sharpened(disparities, comb);
   steps.phase = std::arg(phasor(disparities, steps.frequency)) / (2.0 * kPi);
   const auto half = static_cast<std::ptrdiff_t>(disparities.size() / 2);
   std::nth_element(disparities.begin(), disparities.begin() + half, disparities.end());
   const double median = disparities[static_cast<std::size_t>(half)];
-
-  // Depths rounded to a step of their own look like that near one depth, and so do
-  // steps of disparity in the depths, but only one of them is exact.
-  const double step_m = focal_times_baseline / (median * median) / steps.frequency;
-  const Comb rounding = findComb(crossDifferences(stack, image, regions, depth),
-                                 0.67 * step_m,
-                                 10.0 * step_m);
-  if (rounding.strength > std::max(kExact, comb.strength))
-    return {};
-  return regress(stack, image, regions, cells, steps, median);
+  return regress(stack, image, regions, steps, median);
 }
 
 } // namespace holdfast

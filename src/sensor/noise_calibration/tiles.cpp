@@ -1,16 +1,16 @@
-#include "noise_calibration_tiles.h"
+#include "tiles.h"
 
 #include <algorithm>
-#include <numeric>
 
 namespace holdfast {
 namespace {
 
-// A value farther from the median of its pixel saw something else: many sigmas, since
-// the noise may grow with the range, and wider than the steps of the disparity, in
-// which the smallest noise shows.
-constexpr double kMovedSigmas = 10.0;
-constexpr double kMovedPx = 0.25;
+// A value that is as many typical changes away from the median of its pixel saw
+// something else: many, since the noise may grow with the range.
+constexpr float kMovedChanges = 10.0F;
+
+// What transforming and storing the points changes of a disparity.
+constexpr float kSinglePrecision = 1e-6F;
 
 constexpr double kLeastTileShare = 0.75; // of its pixels
 
@@ -74,7 +74,7 @@ DisparityStack::DisparityStack(const std::vector<PointImage>& frames,
           q.allFinite() && q.z() > 0.0F ? static_cast<float>(fb / q.z()) : kNaN);
   }
   if (this->frames() > 1)
-    dropWhatMoved(std::max(kMovedSigmas * typicalTemporalSigma(), kMovedPx));
+    dropWhatMoved();
 }
 
 DisparityStack::Spread
@@ -92,35 +92,35 @@ DisparityStack::spreadOf(int u, int v) const
   return spread;
 }
 
-/// The median over tiles of what three quarters of their pixels change: unlike that
-/// over pixels, it does not vanish where few change by a step of the disparity, and
-/// flicker does not count.
-double
-DisparityStack::typicalTemporalSigma() const
+/// From frame to frame, px: the median over tiles of the median change in a tile, which
+/// is one sigma of the noise, or the step of the disparities where that is wider. No
+/// change does not count: under wide steps, most pixels keep their value. Infinite when
+/// nothing changes.
+float
+DisparityStack::typicalChange() const
 {
-  std::vector<double> tiles, pixels;
+  std::vector<float> tiles, changes;
   for (int row = 0; row + kTileSize <= height_; row += kTileSize)
     for (int column = 0; column + kTileSize <= width_; column += kTileSize) {
-      pixels.clear();
-      for (int v = row; v < row + kTileSize; ++v)
-        for (int u = column; u < column + kTileSize; ++u) {
-          const Spread pixel = spreadOf(u, v);
-          if (pixel.count > 1)
-            pixels.push_back(pixel.squares / (pixel.count - 1));
+      changes.clear();
+      for (int t = 1; t < frames(); ++t)
+        for (int k = 0; k < kTileSize * kTileSize; ++k) {
+          const int u = column + k % kTileSize, v = row + k / kTileSize;
+          const float d = disparity(t, u, v);
+          const float change = std::abs(d - disparity(t - 1, u, v));
+          if (change > kSinglePrecision * d) // not for NaN
+            changes.push_back(change);
         }
-      if (pixels.empty())
-        continue;
-      std::sort(pixels.begin(), pixels.end());
-      pixels.resize(3 * pixels.size() / 4 + 1);
-      tiles.push_back(std::accumulate(pixels.begin(), pixels.end(), 0.0) /
-                      static_cast<double>(pixels.size()));
+      if (!changes.empty())
+        tiles.push_back(medianOf(changes));
     }
-  return tiles.empty() ? 0.0 : std::sqrt(medianOf(tiles));
+  return tiles.empty() ? std::numeric_limits<float>::infinity() : medianOf(tiles);
 }
 
 void
-DisparityStack::dropWhatMoved(double limit_px)
+DisparityStack::dropWhatMoved()
 {
+  const float limit = kMovedChanges * typicalChange();
   std::vector<float> values;
   for (std::size_t i = 0; i < frames_.front().size(); ++i) {
     values.clear();
@@ -130,7 +130,7 @@ DisparityStack::dropWhatMoved(double limit_px)
     const float median = values.empty() ? kNaN : medianOf(values);
     std::size_t kept = 0;
     for (auto& frame : frames_) {
-      if (!(std::abs(frame[i] - median) <= limit_px))
+      if (!(std::abs(frame[i] - median) <= limit))
         frame[i] = kNaN;
       kept += std::isfinite(frame[i]);
     }
