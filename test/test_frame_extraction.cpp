@@ -1,3 +1,4 @@
+#include "support/extraction_seeds.h"
 #include "support/organized_cloud.h"
 #include "support/random.h"
 
@@ -13,6 +14,7 @@ using test::makeCamera;
 using test::makeOrganizedCloud;
 using test::makeSensor;
 using test::Random;
+using test::seedsOf;
 
 const Camera kCamera = makeCamera(160, 120, 150.0);
 
@@ -33,15 +35,6 @@ makeOptions(int max_patches)
   options.sampler.max_patches = max_patches;
   options.threads = 1;
   return options;
-}
-
-std::vector<int>
-seedsOf(const ExtractionResult& result)
-{
-  std::vector<int> seeds;
-  for (const ExtractedPatch& patch : result.patches)
-    seeds.push_back(*patch.seed_index);
-  return seeds;
 }
 
 TEST(FrameExtractor, KeepsTheSeedsOfASceneThatStays)

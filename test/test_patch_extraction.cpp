@@ -1,3 +1,4 @@
+#include "support/extraction_seeds.h"
 #include "support/organized_cloud.h"
 #include "support/random.h"
 
@@ -18,6 +19,7 @@ using test::makeCamera;
 using test::makeOrganizedCloud;
 using test::makeSensor;
 using test::Random;
+using test::seedsOf;
 
 const Camera kCamera = makeCamera(160, 120, 150.0);
 
@@ -218,15 +220,6 @@ TEST(ExtractPatches, KeepsTheOrderOfTheSeedsAndCountsTheRest)
     ASSERT_NE(next, seeds.end());
     EXPECT_EQ(p.seed, (*cloud.points)[*p.seed_index].getVector3fMap().cast<double>());
   }
-}
-
-std::vector<int>
-seedsOf(const ExtractionResult& result)
-{
-  std::vector<int> seeds;
-  for (const ExtractedPatch& patch : result.patches)
-    seeds.push_back(*patch.seed_index);
-  return seeds;
 }
 
 TEST(ExtractPatches, StopsWhenTheAreaIsCovered)

@@ -37,7 +37,8 @@ toShown(const ExtractedPatch& patch)
 } // namespace
 
 PatchView::PatchView()
-: window_(openViewer("dark: normal within 0.1 deg, yellow: within 10 deg"))
+: window_(openViewer(formatNumber("dark: normal within %g deg, ", kSurest) +
+                     formatNumber("yellow: within %g deg", kLeastSure)))
 {}
 
 void

@@ -11,6 +11,7 @@
 #include <limits>
 #include <optional>
 #include <stdexcept>
+#include <string>
 
 namespace holdfast { namespace {
 
@@ -22,7 +23,7 @@ using Colored = pcl::PointCloud<pcl::PointXYZRGB>;
 constexpr double kSigmas95 = 2.7955;
 
 /// Of the error ellipsoid, which would be too small to see.
-constexpr double kEnlargement = 50.0;
+constexpr int kEnlargement = 50;
 
 constexpr double kMeshSpacing = 0.01; // m
 
@@ -195,7 +196,8 @@ ViewerWindow::showSelected()
                                       0.3,
                                       0.2,
                                       kEllipsoidId);
-  window_.addText(shown->caption + "\nellipsoid: 95 % of the centre, 50 times enlarged",
+  window_.addText(shown->caption + "\nellipsoid: 95 % of the centre, " +
+                      std::to_string(kEnlargement) + " times enlarged",
                   10,
                   30,
                   14,

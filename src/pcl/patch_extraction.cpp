@@ -352,8 +352,9 @@ PatchExtractor::fitWithinLimits(const std::vector<int>& seeds,
   const NeighborhoodSearch search_again = impl_->searchOf(sampler);
   std::vector<int> indices;
   InOrder count(seeds.size(), [&](std::size_t i) {
-    if (isAccepted(attempts[i]) && budget.countsPatches()) {
-      search_again(places[i], 0, indices);
+    if (isAccepted(attempts[i])) {
+      if (budget.limitsArea())
+        search_again(places[i], 0, indices);
       budget.cover(indices, projectedArea(attempts[i].fit.patch));
     }
     return budget.isFull();

@@ -18,14 +18,15 @@ namespace holdfast {
 /// (options.sampler.random_seed), so that few seeds span the image, too.
 class FrameExtractor {
 public:
-  /// \throw std::invalid_argument when neither max_seeds nor max_patches is set, and as
-  /// extractPatches().
+  /// \throw std::invalid_argument when neither max_seeds nor max_patches is set, or a
+  /// sampler option makes no sense.
   FrameExtractor(const Sensor& sensor, const ExtractionOptions& options);
 
   /// Patches of the next frame; those of the old seeds come first. Without max_time_s
   /// the result depends on the frames so far alone. A frame of another size starts
   /// anew.
-  /// \throw std::invalid_argument when the cloud is not organized.
+  /// \throw std::invalid_argument when the cloud is not organized, and as
+  /// extractPatches().
   ExtractionResult extract(const RangeCloud& frame);
 
 private:

@@ -35,8 +35,8 @@ public:
                  Clock::time_point start = Clock::now());
 
   /// Counts a patch and its neighbourhood. \param indices of its points, without
-  /// repetition. \param area_m2 of its surface: that of the fitted patch, or without a
-  /// fit the pi r^2 of a whole disc.
+  /// repetition; they do not matter unless limitsArea(). \param area_m2 of its surface:
+  /// that of the fitted patch, or without a fit the pi r^2 of a whole disc.
   void cover(const std::vector<int>& indices, double area_m2);
 
   /// Enough patches or area.
@@ -49,10 +49,9 @@ public:
     return isFull() || isOutOfTime();
   }
 
-  /// False when only time matters, so that nothing need be covered.
-  bool countsPatches() const
+  bool limitsArea() const
   {
-    return max_patches_ > 0 || max_area_m2_ > 0.0;
+    return max_area_m2_ > 0.0;
   }
 
   double coveredArea() const ///< m^2
