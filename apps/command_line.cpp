@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace holdfast {
+namespace holdfast::app {
 
 CLI::Validator
 positiveNumber(const std::string& unit)
@@ -42,4 +42,4 @@ tidyHelp(CLI::App& command)
   }
 }
 
-} // namespace holdfast
+} // namespace holdfast::app

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-namespace holdfast {
+namespace holdfast::app {
 
 /// Accepts positive finite numbers; `unit` is shown in the help.
 CLI::Validator positiveNumber(const std::string& unit);
@@ -47,4 +47,4 @@ addChoice(CLI::App& command,
       ->check(CLI::IsMember(names));
 }
 
-} // namespace holdfast
+} // namespace holdfast::app

@@ -9,7 +9,7 @@
 
 #include <CLI/App.hpp>
 
-namespace holdfast {
+namespace holdfast::app {
 
 void addCalibrateCommand(CLI::App& app, int& exit_code);
 void addExperimentCommand(CLI::App& app, int& exit_code);
@@ -22,4 +22,4 @@ void addSimulateCommand(CLI::App& app, int& exit_code);
 void addLiveCommand(CLI::App& app, int& exit_code);
 void addRecordCommand(CLI::App& app, int& exit_code);
 
-} // namespace holdfast
+} // namespace holdfast::app

@@ -11,7 +11,7 @@
 #include <sstream>
 #include <utility>
 
-namespace holdfast {
+namespace holdfast::app {
 namespace {
 
 constexpr int kBarWidth = 30;
@@ -156,4 +156,4 @@ formatNumber(const char* format, double value)
   return text;
 }
 
-} // namespace holdfast
+} // namespace holdfast::app

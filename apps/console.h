@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace holdfast {
+namespace holdfast::app {
 
 /// "holdfast: MESSAGE" on standard error.
 void printError(const std::string& message);
@@ -68,4 +68,4 @@ std::string formatTable(const std::vector<std::vector<std::string>>& rows);
 /// printf of one number.
 std::string formatNumber(const char* format, double value);
 
-} // namespace holdfast
+} // namespace holdfast::app

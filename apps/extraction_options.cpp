@@ -4,7 +4,7 @@
 
 #include <CLI/CLI.hpp>
 
-namespace holdfast {
+namespace holdfast::app {
 namespace {
 
 const Choices<SurfaceRequest> kSurfaces{
@@ -230,4 +230,4 @@ finishExtractionOptions(const CLI::App& command, ExtractionSettings& settings)
     throw CLI::ValidationError("fit", error);
 }
 
-} // namespace holdfast
+} // namespace holdfast::app

@@ -5,7 +5,7 @@
 
 #include <CLI/App.hpp>
 
-namespace holdfast {
+namespace holdfast::app {
 
 struct ExtractionSettings {
   /// Complete after finishExtractionOptions().
@@ -21,4 +21,4 @@ void addExtractionOptions(CLI::App& command, ExtractionSettings& settings);
 /// that make no sense.
 void finishExtractionOptions(const CLI::App& command, ExtractionSettings& settings);
 
-} // namespace holdfast
+} // namespace holdfast::app

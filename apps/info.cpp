@@ -16,7 +16,7 @@
 #include <memory>
 #include <optional>
 
-namespace holdfast {
+namespace holdfast::app {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -244,4 +244,4 @@ addInfoCommand(CLI::App& app, int& exit_code)
   command->callback([settings, &exit_code] { exit_code = runInfo(*settings); });
 }
 
-} // namespace holdfast
+} // namespace holdfast::app

@@ -8,7 +8,7 @@
 
 #include <stdexcept>
 
-namespace holdfast {
+namespace holdfast::app {
 namespace {
 
 std::string
@@ -97,4 +97,4 @@ inputNotices(const InputOptions& options, const CloudFileInfo& info)
   return notices;
 }
 
-} // namespace holdfast
+} // namespace holdfast::app

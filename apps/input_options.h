@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace holdfast {
+namespace holdfast::app {
 
 struct InputOptions {
   std::vector<std::string> clouds; ///< files and folders
@@ -36,4 +36,4 @@ LoadOptions loadOptions(const InputOptions& options, const Sensor& sensor);
 std::vector<std::string> inputNotices(const InputOptions& options,
                                       const CloudFileInfo& info);
 
-} // namespace holdfast
+} // namespace holdfast::app

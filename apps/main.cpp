@@ -34,7 +34,7 @@ flushed(int exit_code)
 {
   if (std::cout.flush())
     return exit_code;
-  holdfast::printError("standard output cannot be written");
+  holdfast::app::printError("standard output cannot be written");
   return 1;
 }
 
@@ -47,16 +47,16 @@ run(int argc, char** argv)
   app.set_version_flag("--version", "holdfast " HOLDFAST_VERSION);
   app.require_subcommand(1);
   int exit_code = 0;
-  holdfast::addFitCommand(app, exit_code);
-  holdfast::addInfoCommand(app, exit_code);
+  holdfast::app::addFitCommand(app, exit_code);
+  holdfast::app::addInfoCommand(app, exit_code);
 #ifdef HOLDFAST_HAVE_OPENNI2
-  holdfast::addLiveCommand(app, exit_code);
-  holdfast::addRecordCommand(app, exit_code);
+  holdfast::app::addLiveCommand(app, exit_code);
+  holdfast::app::addRecordCommand(app, exit_code);
 #endif
-  holdfast::addRenderCommand(app, exit_code);
-  holdfast::addCalibrateCommand(app, exit_code);
-  holdfast::addSimulateCommand(app, exit_code);
-  holdfast::addExperimentCommand(app, exit_code);
+  holdfast::app::addRenderCommand(app, exit_code);
+  holdfast::app::addCalibrateCommand(app, exit_code);
+  holdfast::app::addSimulateCommand(app, exit_code);
+  holdfast::app::addExperimentCommand(app, exit_code);
   try {
     app.parse(argc, argv);
     return flushed(exit_code);
@@ -65,7 +65,7 @@ run(int argc, char** argv)
     if (error.get_exit_code() == 0) // --help and --version
       return flushed(app.exit(error));
     const std::string message = error.what();
-    holdfast::printError(message.substr(0, message.find('\n')));
+    holdfast::app::printError(message.substr(0, message.find('\n')));
     return 2;
   }
 }
@@ -79,7 +79,7 @@ main(int argc, char** argv)
     return run(argc, argv);
   }
   catch (const std::exception& error) {
-    holdfast::printError(error.what());
+    holdfast::app::printError(error.what());
     return 1;
   }
 }

@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <stdexcept>
 
-namespace holdfast {
+namespace holdfast::app {
 
 namespace fs = std::filesystem;
 
@@ -51,4 +51,4 @@ writePatchFiles(const PatchReport& report,
   json.commit();
 }
 
-} // namespace holdfast
+} // namespace holdfast::app

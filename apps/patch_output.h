@@ -5,7 +5,7 @@
 
 #include <string>
 
-namespace holdfast {
+namespace holdfast::app {
 
 /// Says early that a folder cannot be used, but does not create it yet.
 /// \throw std::runtime_error "FOLDER: cause".
@@ -20,4 +20,4 @@ void writePatchFiles(const PatchReport& report,
                      const std::string& folder,
                      const std::string& stem);
 
-} // namespace holdfast
+} // namespace holdfast::app

@@ -7,7 +7,7 @@
 #include <limits>
 #include <sstream>
 
-namespace holdfast {
+namespace holdfast::app {
 namespace {
 
 // Sizes in px.
@@ -482,4 +482,4 @@ writeSvg(std::ostream& out, const Plot& plot, const std::string& description)
       << body.str() << "</svg>\n";
 }
 
-} // namespace holdfast
+} // namespace holdfast::app

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace holdfast {
+namespace holdfast::app {
 
 struct Axis {
   std::string label; ///< with its unit
@@ -48,4 +48,4 @@ struct Plot {
 /// \param description goes into the file as its <desc>.
 void writeSvg(std::ostream& out, const Plot& plot, const std::string& description);
 
-} // namespace holdfast
+} // namespace holdfast::app

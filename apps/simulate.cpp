@@ -2,7 +2,7 @@
 #include <holdfast/io/cloud_io.h>
 #include <holdfast/io/config.h>
 #include <holdfast/patch/parameters.h>
-#include <holdfast/sensor/simulator.h>
+#include <holdfast/simulation/simulator.h>
 #include <holdfast/version.h>
 
 #include <CLI/CLI.hpp>
@@ -22,7 +22,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace holdfast {
+namespace holdfast::app {
 
 namespace {
 
@@ -307,4 +307,4 @@ addSimulateCommand(CLI::App& app, int& exit_code)
   });
 }
 
-} // namespace holdfast
+} // namespace holdfast::app

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <functional>
 
-namespace holdfast {
+namespace holdfast::app {
 namespace {
 
 using Measure = std::function<double(const FitResult&)>;
@@ -118,4 +118,4 @@ summaryTable(const PatchReport& report)
          (rejected.empty() ? "" : "rejected: " + rejected + "\n");
 }
 
-} // namespace holdfast
+} // namespace holdfast::app

@@ -5,7 +5,7 @@
 
 #include <string>
 
-namespace holdfast {
+namespace holdfast::app {
 
 /// Rms angle between the fitted and the noise-free normal, from the covariance.
 double normalSigmaDegrees(const FitResult& fit);
@@ -22,4 +22,4 @@ std::string summaryTable(const PatchReport& report);
 /// "too_few_points 12, degenerate 3, coverage_too_low 8".
 std::string rejectedText(const ExtractionResult& result);
 
-} // namespace holdfast
+} // namespace holdfast::app

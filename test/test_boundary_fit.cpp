@@ -4,7 +4,7 @@
 #include "support/patch_batch.h"
 #include "support/random_patch.h"
 
-#include <holdfast/fit/boundary_fit.h>
+#include "fit/boundary_fit.h"
 #include <holdfast/geometry/rotation.h>
 
 #include <Eigen/Eigenvalues>

@@ -1,4 +1,4 @@
-#include <holdfast/sensor/simulator.h>
+#include <holdfast/simulation/simulator.h>
 
 #include "support/random.h"
 

@@ -1,8 +1,8 @@
 // Stage I-3: the type of a paraboloid from its curvatures and their covariance.
 #include "support/patch_batch.h"
 
-#include <holdfast/fit/discrimination.h>
-#include <holdfast/fit/fit_patch.h>
+#include "fit/discrimination.h"
+#include "fit/fit_patch.h"
 
 #include <cmath>
 

@@ -165,25 +165,6 @@ TEST_F(ExperimentProgram, NeighborhoodsShowThatSmallBallsCutTheNoise)
   }
 }
 
-TEST_F(ExperimentProgram, NoiseJudgesTheModelsOnRecordedFrames)
-{
-  const std::string cloud = test::recordedCloud("mosd_static_learn17.pcd");
-  if (cloud.empty())
-    GTEST_SKIP() << "no recorded clouds (HOLDFAST_DATA_DIR)";
-  const Json json =
-      shortRun("noise",
-               {"--data", std::filesystem::path(cloud).parent_path().string()});
-  ASSERT_EQ(json.at("rows").size(), 6u);
-  const Json& stereo = json.at("rows").front();
-  EXPECT_EQ(stereo.at("model"), "stereo");
-  // The default sigmas are of the right size for one frame, and much too large for the
-  // change between frames.
-  EXPECT_GT(stereo.at("chi2_per_dof_whole_table").get<double>(), 0.3);
-  EXPECT_LT(stereo.at("chi2_per_dof_whole_table").get<double>(), 1.5);
-  EXPECT_LT(stereo.at("variance_ratio_across_frames").get<double>(), 0.3);
-  EXPECT_NE(json.at("remarks").dump().find("default sigmas"), std::string::npos);
-}
-
 TEST_F(ExperimentProgram, PclIsBiasedWhereHoldfastIsNot)
 {
   const Json json = shortRun("pcl");
@@ -237,14 +218,13 @@ TEST_F(ExperimentProgram, SaysInOneLineWhatIsWrong)
                           {"table1", "--trials", "1"},
                           {"table1", "--seed", "-1"},
                           {"table1", "--frobnicate"},
-                          {"noise", "--data", folder_ + "/missing"}}) {
+                          {"figure6", "--data", folder_ + "/missing"}}) {
     const test::ProgramRun run = experiment(arguments);
     EXPECT_EQ(run.exit_code, 2) << run.err;
     EXPECT_EQ(run.errorLines(), 1) << run.err;
     EXPECT_EQ(run.out, "");
   }
   for (const Names& arguments : std::vector<Names>{
-           {"noise", "--data", folder_},
            {"table1", "--trials", "2", "-o", "/dev/null/results"},
            {"table1", "--trials", "2", "--json", folder_ + "/no/file"}}) {
     const test::ProgramRun run = experiment(arguments);
@@ -252,14 +232,6 @@ TEST_F(ExperimentProgram, SaysInOneLineWhatIsWrong)
     EXPECT_EQ(run.errorLines(), 1) << run.err;
   }
   EXPECT_EQ(test::filesIn(folder_), no_files);
-}
-
-TEST_F(ExperimentProgram, NoiseNeedsAFolder)
-{
-  ::unsetenv("HOLDFAST_DATA_DIR");
-  const test::ProgramRun run = experiment({"noise"});
-  EXPECT_EQ(run.exit_code, 2);
-  EXPECT_NE(run.err.find("--data"), std::string::npos);
 }
 
 }} // namespace holdfast

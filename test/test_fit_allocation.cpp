@@ -3,7 +3,7 @@
 #include "support/patch_batch.h"
 #include "support/random_patch.h"
 
-#include <holdfast/uncertainty/covariance.h>
+#include <holdfast/patch_estimator.h>
 
 #include <atomic>
 #include <cerrno>

@@ -10,10 +10,10 @@
 #include "support/patch_batch.h"
 #include "support/random_patch.h"
 
-#include <holdfast/fit/boundary_fit.h>
+#include "fit/boundary_fit.h"
 #include <holdfast/geometry/rotation.h>
 #include <holdfast/patch/surface.h>
-#include <holdfast/uncertainty/covariance.h>
+#include <holdfast/patch_estimator.h>
 
 namespace holdfast { namespace {
 

@@ -4,7 +4,7 @@
 #include "support/random_patch.h"
 
 #include <holdfast/geometry/gaussian.h>
-#include <holdfast/uncertainty/covariance.h>
+#include <holdfast/patch_estimator.h>
 
 #include <limits>
 #include <stdexcept>

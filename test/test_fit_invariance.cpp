@@ -5,7 +5,7 @@
 
 #include <holdfast/geometry/gaussian.h>
 #include <holdfast/geometry/rotation.h>
-#include <holdfast/uncertainty/covariance.h>
+#include <holdfast/patch_estimator.h>
 
 #include <algorithm>
 #include <numeric>

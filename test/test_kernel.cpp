@@ -2,9 +2,9 @@
 // differences of the cost, written down here again for any quadric.
 #include "support/random.h"
 
-#include <holdfast/fit/kernel.h>
+#include "fit/kernel.h"
+#include "fit/surface_fit.h"
 #include <holdfast/fit/point_batch.h>
-#include <holdfast/fit/surface_fit.h>
 
 #include <functional>
 #include <limits>

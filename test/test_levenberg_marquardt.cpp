@@ -1,7 +1,7 @@
 // The minimiser on problems whose solutions are known.
 #include "support/random.h"
 
-#include <holdfast/fit/levenberg_marquardt.h>
+#include "fit/levenberg_marquardt.h"
 
 #include <limits>
 

@@ -1,8 +1,8 @@
 // The paper's distances between patches, and covariances summed up by them.
 #include "support/random_patch.h"
 
+#include <holdfast/evaluation/metrics.h>
 #include <holdfast/geometry/rotation.h>
-#include <holdfast/uncertainty/metrics.h>
 
 #include <Eigen/SVD>
 #include <gtest/gtest.h>

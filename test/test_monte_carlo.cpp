@@ -3,11 +3,11 @@
 #include "support/patch_batch.h"
 #include "support/random_patch.h"
 
-#include <holdfast/fit/fit_patch.h>
+#include "fit/fit_patch.h"
+#include <holdfast/evaluation/metrics.h>
 #include <holdfast/geometry/rotation.h>
 #include <holdfast/patch/boundary.h>
-#include <holdfast/uncertainty/covariance.h>
-#include <holdfast/uncertainty/metrics.h>
+#include <holdfast/patch_estimator.h>
 #include <holdfast/uncertainty/monte_carlo.h>
 
 #include <gtest/gtest.h>
@@ -225,10 +225,10 @@ TEST(ForEachIndex, CallsEachOnce)
   for (const int threads : {0, 1, 3, 50}) {
     std::vector<std::atomic<int>> calls(40);
     int reports = 0;
-    forEachIndex(
+    parallelFor(
         40,
         threads,
-        [&calls](int i) { ++calls[static_cast<std::size_t>(i)]; },
+        [&calls](int i, int) { ++calls[static_cast<std::size_t>(i)]; },
         [&reports](int, int total) {
           ++reports;
           EXPECT_EQ(total, 40);
@@ -242,12 +242,12 @@ TEST(ForEachIndex, CallsEachOnce)
 TEST(ForEachIndex, PassesOnExceptions)
 {
   for (const int threads : {1, 4})
-    EXPECT_THROW(forEachIndex(100,
-                              threads,
-                              [](int i) {
-                                if (i == 10)
-                                  throw std::runtime_error("ten");
-                              }),
+    EXPECT_THROW(parallelFor(100,
+                             threads,
+                             [](int i, int) {
+                               if (i == 10)
+                                 throw std::runtime_error("ten");
+                             }),
                  std::runtime_error);
 }
 

@@ -1,5 +1,5 @@
 #include <holdfast/sensor/noise_calibration.h>
-#include <holdfast/sensor/simulator.h>
+#include <holdfast/simulation/simulator.h>
 
 #include "support/random.h"
 

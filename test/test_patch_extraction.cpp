@@ -2,10 +2,10 @@
 #include "support/organized_cloud.h"
 #include "support/random.h"
 
+#include "pcl/sampling_budget.h"
 #include <holdfast/fit/reference_points.h>
 #include <holdfast/patch/boundary.h>
 #include <holdfast/pcl/patch_extraction.h>
-#include <holdfast/pcl/sampling_budget.h>
 #include <holdfast/sensor/constant_noise_model.h>
 #include <holdfast/sensor/dryanovski_noise_model.h>
 

@@ -4,7 +4,7 @@
 
 #include <holdfast/geometry/rotation.h>
 #include <holdfast/patch/surface.h>
-#include <holdfast/pcl/sac_model_patch_engine.h>
+#include <holdfast/pcl/impl/sac_engine.h>
 
 #include "pcl/sac_minimal_solvers.h"
 

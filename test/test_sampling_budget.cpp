@@ -1,8 +1,8 @@
 #include "support/organized_cloud.h"
 #include "support/random.h"
 
+#include "pcl/sampling_budget.h"
 #include <holdfast/geometry/constants.h>
-#include <holdfast/pcl/sampling_budget.h>
 
 #include <set>
 #include <stdexcept>

@@ -1,7 +1,7 @@
 #include <holdfast/io/cloud_io.h>
 #include <holdfast/patch/parameters.h>
 #include <holdfast/patch/surface.h>
-#include <holdfast/sensor/scene.h>
+#include <holdfast/simulation/scene.h>
 
 #include "support/run_program.h"
 

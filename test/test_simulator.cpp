@@ -1,9 +1,9 @@
 #include <holdfast/patch/boundary.h>
 #include <holdfast/patch/surface.h>
-#include <holdfast/sensor/calibration_scenes.h>
 #include <holdfast/sensor/constant_noise_model.h>
-#include <holdfast/sensor/simulator.h>
 #include <holdfast/sensor/stereo_noise_model.h>
+#include <holdfast/simulation/reference_scenes.h>
+#include <holdfast/simulation/simulator.h>
 
 #include "support/random.h"
 
@@ -55,11 +55,11 @@ expectConsistent(const RangeImage& image)
   }
 }
 
-class CalibrationScenes : public testing::TestWithParam<PatchType> {};
+class ReferenceScenes : public testing::TestWithParam<PatchType> {};
 
-TEST_P(CalibrationScenes, HitsLieOnTheBoundedSurface)
+TEST_P(ReferenceScenes, HitsLieOnTheBoundedSurface)
 {
-  for (const CalibrationScene& view :
+  for (const ReferenceScene& view :
        {tableTwoScene(GetParam()), robotScene(GetParam(), 1.0, 0.5, 0.6)}) {
     const Patch& patch = view.scene.patches.front();
     ASSERT_EQ(validityError(patch), "");
@@ -82,7 +82,7 @@ TEST_P(CalibrationScenes, HitsLieOnTheBoundedSurface)
 }
 
 INSTANTIATE_TEST_SUITE_P(AllTypes,
-                         CalibrationScenes,
+                         ReferenceScenes,
                          testing::ValuesIn(kPatchTypes),
                          [](const auto& test) {
                            return std::string(surfaceName(test.param.surface)) + "_" +
@@ -302,7 +302,7 @@ TEST(Noise, HasTheCovarianceOfTheModel)
 {
   test::Random random;
   const Sensor sensor = kinect();
-  const CalibrationScene view = robotScene(kPatchTypes.front(), 1.0, 0.5, 0.6);
+  const ReferenceScene view = robotScene(kPatchTypes.front(), 1.0, 0.5, 0.6);
   RangeImage image = castRays(view.scene, view.rays);
   constexpr double kScale = 0.7;
   attachNoise(image, *sensor.noise, kScale);
@@ -337,7 +337,7 @@ TEST(Noise, HasTheCovarianceOfTheModel)
 
 TEST(Noise, RootsBelongToTheCovariances)
 {
-  const CalibrationScene view = tableTwoScene(kPatchTypes.front());
+  const ReferenceScene view = tableTwoScene(kPatchTypes.front());
   RangeImage image = castRays(view.scene, view.rays);
   attachNoise(image, *kinect().noise);
   for (std::size_t i = 0; i < image.roots.size(); ++i)

@@ -5,8 +5,8 @@
 #include "support/random_patch.h"
 #include "uncertainty/stagewise_stages.h"
 
-#include <holdfast/uncertainty/covariance.h>
-#include <holdfast/uncertainty/stagewise.h>
+#include "uncertainty/stagewise.h"
+#include <holdfast/patch_estimator.h>
 
 #include <Eigen/Geometry>
 
@@ -392,10 +392,10 @@ TEST_P(Stagewise, SigmasAreOfTheRightMagnitude)
   for (const FitOptions& options : {FitOptions{}, FitOptions::paper()})
     for (int view = 0; view < 20; ++view) {
       Random random(view);
-      const CalibrationScene scene = robotScene(GetParam(),
-                                                1.0,
-                                                random.uniform(0.2, 0.8),
-                                                random.uniform(0.0, 6.28));
+      const ReferenceScene scene = robotScene(GetParam(),
+                                              1.0,
+                                              random.uniform(0.2, 0.8),
+                                              random.uniform(0.0, 6.28));
       const VectorXd ratio = sigmaRatios(test::sampleScene(scene, 1.0, random.engine()),
                                          test::optionsFor(GetParam(), options));
       for (int i = 0; i < ratio.size(); ++i) {

@@ -3,9 +3,9 @@
 #include "support/small_clouds.h"
 
 #include <holdfast/geometry/gaussian.h>
+#include <holdfast/patch_estimator.h>
 #include <holdfast/pcl/conversions.h>
 #include <holdfast/pcl/transforms.h>
-#include <holdfast/uncertainty/covariance.h>
 
 #include <pcl/common/transforms.h>
 

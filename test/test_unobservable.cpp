@@ -3,7 +3,7 @@
 #include "support/patch_batch.h"
 
 #include <holdfast/geometry/rotation.h>
-#include <holdfast/uncertainty/covariance.h>
+#include <holdfast/patch_estimator.h>
 
 #include <Eigen/Eigenvalues>
 
@@ -83,7 +83,7 @@ Sweep
 sweep(PatchType type, const Eigen::Vector2d& kappa)
 {
   Random random(static_cast<std::uint64_t>(-1e3 * kappa.sum()));
-  CalibrationScene scene = robotScene(type, 0.9, 0.5, 0.6);
+  ReferenceScene scene = robotScene(type, 0.9, 0.5, 0.6);
   Patch& truth = scene.scene.patches[0];
   truth.kappa = kappa;
   const test::CleanSample clean = test::cleanSample(scene);

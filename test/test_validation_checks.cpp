@@ -3,7 +3,7 @@
 #include "support/random_patch.h"
 
 #include <holdfast/patch/boundary.h>
-#include <holdfast/uncertainty/covariance.h>
+#include <holdfast/patch_estimator.h>
 #include <holdfast/validation/checks.h>
 
 #include <limits>

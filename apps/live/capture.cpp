@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace holdfast {
+namespace holdfast::app {
 
 std::vector<RangeCloud>
 captureFrames(const Openni2Options& options, int frames, Camera& camera)
@@ -33,4 +33,4 @@ captureFrames(const Openni2Options& options, int frames, Camera& camera)
   return clouds;
 }
 
-} // namespace holdfast
+} // namespace holdfast::app

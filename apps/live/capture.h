@@ -5,7 +5,7 @@
 
 #include <vector>
 
-namespace holdfast {
+namespace holdfast::app {
 
 /// The next frames of a camera, or fewer when a recording ends or the user interrupts,
 /// with a status line. `camera` receives its intrinsics.
@@ -15,4 +15,4 @@ std::vector<RangeCloud> captureFrames(const Openni2Options& options,
                                       int frames,
                                       Camera& camera);
 
-} // namespace holdfast
+} // namespace holdfast::app

@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace holdfast {
+namespace holdfast::app {
 
 namespace {
 
@@ -93,4 +93,4 @@ addRunOptions(CLI::App& command, RunOptions& options)
       ->group(group);
 }
 
-} // namespace holdfast
+} // namespace holdfast::app

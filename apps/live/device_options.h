@@ -7,7 +7,7 @@
 
 #include <CLI/App.hpp>
 
-namespace holdfast {
+namespace holdfast::app {
 
 /// Adds --device, --list, --size, --registration, --every-frame and --no-reconnect.
 /// `options` must outlive the parsing.
@@ -16,4 +16,4 @@ void addDeviceOptions(CLI::App& command, Openni2Options& options);
 /// Adds --frames, --seconds and --quiet.
 void addRunOptions(CLI::App& command, RunOptions& options);
 
-} // namespace holdfast
+} // namespace holdfast::app

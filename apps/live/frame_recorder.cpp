@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
-namespace holdfast {
+namespace holdfast::app {
 namespace {
 
 /// A second of a camera's frames, 110 MB.
@@ -121,4 +121,4 @@ FrameRecorder::write()
   }
 }
 
-} // namespace holdfast
+} // namespace holdfast::app

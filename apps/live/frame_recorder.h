@@ -11,7 +11,7 @@
 #include <thread>
 #include <utility>
 
-namespace holdfast {
+namespace holdfast::app {
 
 /// "frame_000017".
 std::string frameName(std::uint64_t number);
@@ -55,4 +55,4 @@ private:
   std::thread thread_; ///< the last, so that it finds everything else in place
 };
 
-} // namespace holdfast
+} // namespace holdfast::app

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-namespace holdfast {
+namespace holdfast::app {
 namespace {
 
 /// Atomic, since a signal may come to any thread.
@@ -220,4 +220,4 @@ runGrabber(Openni2Grabber& grabber,
   return well ? 0 : 1;
 }
 
-} // namespace holdfast
+} // namespace holdfast::app

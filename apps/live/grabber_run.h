@@ -8,7 +8,7 @@
 #include <functional>
 #include <string>
 
-namespace holdfast {
+namespace holdfast::app {
 
 struct RunOptions {
   int frames = 0; ///< end after so many; 0: never
@@ -36,4 +36,4 @@ int runGrabber(Openni2Grabber& grabber,
                const RunOptions& options,
                const RunCallbacks& callbacks);
 
-} // namespace holdfast
+} // namespace holdfast::app

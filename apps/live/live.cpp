@@ -21,7 +21,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace holdfast {
+namespace holdfast::app {
 namespace {
 
 constexpr const char* kExamples = R"(Examples:
@@ -285,4 +285,4 @@ addLiveCommand(CLI::App& app, int& exit_code)
       [command, settings, &exit_code] { exit_code = runLive(*command, *settings); });
 }
 
-} // namespace holdfast
+} // namespace holdfast::app

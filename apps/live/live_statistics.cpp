@@ -9,7 +9,7 @@
 #include <fstream>
 #include <sstream>
 
-namespace holdfast {
+namespace holdfast::app {
 namespace {
 
 constexpr double kStepsPerMs = 10.0; // of the histogram of latencies
@@ -145,4 +145,4 @@ LiveStatistics::summary(const std::string& dropped) const
   return out.str();
 }
 
-} // namespace holdfast
+} // namespace holdfast::app

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-namespace holdfast {
+namespace holdfast::app {
 
 /// Counts of whole numbers, in memory that does not grow with them.
 class Histogram {
@@ -68,4 +68,4 @@ private:
   double early_memory_mb_ = 0.0; ///< when all that is kept has been allocated
 };
 
-} // namespace holdfast
+} // namespace holdfast::app

@@ -1,13 +1,13 @@
 #include "patch_view.h"
 
 #include "console.h"
-#include "render_colors.h"
+#include "render/render_colors.h"
 #include "summary.h"
 
 #include <cmath>
 #include <utility>
 
-namespace holdfast {
+namespace holdfast::app {
 namespace {
 
 /// Ends of the scale of colours, rms angle of the normal, degrees.
@@ -65,4 +65,4 @@ PatchView::update()
   return window_->update();
 }
 
-} // namespace holdfast
+} // namespace holdfast::app

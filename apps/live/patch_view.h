@@ -8,7 +8,7 @@
 #include <mutex>
 #include <vector>
 
-namespace holdfast {
+namespace holdfast::app {
 
 /// Hands the newest frame from the grabber's thread to the window's.
 class PatchView {
@@ -29,4 +29,4 @@ private:
   std::vector<ShownPatch> patches_;
 };
 
-} // namespace holdfast
+} // namespace holdfast::app

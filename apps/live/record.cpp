@@ -12,7 +12,7 @@
 #include <memory>
 #include <string>
 
-namespace holdfast {
+namespace holdfast::app {
 namespace {
 
 constexpr const char* kExamples = R"(Examples:
@@ -93,4 +93,4 @@ addRecordCommand(CLI::App& app, int& exit_code)
   command->callback([settings, &exit_code] { exit_code = runRecord(*settings); });
 }
 
-} // namespace holdfast
+} // namespace holdfast::app

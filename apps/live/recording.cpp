@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <stdexcept>
 
-namespace holdfast {
+namespace holdfast::app {
 namespace {
 
 /// Some frames and the end of a file.
@@ -61,4 +61,4 @@ Recording::dropped() const
   return folder_ ? folder_->dropped() : 0;
 }
 
-} // namespace holdfast
+} // namespace holdfast::app

@@ -8,7 +8,7 @@
 #include <memory>
 #include <string>
 
-namespace holdfast {
+namespace holdfast::app {
 
 /// Whether a recording of this name is an .oni file.
 bool isOniPath(const std::string& path);
@@ -39,4 +39,4 @@ private:
   std::unique_ptr<FrameRecorder> folder_; ///< null: an .oni file
 };
 
-} // namespace holdfast
+} // namespace holdfast::app

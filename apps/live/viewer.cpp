@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <stdexcept>
 
-namespace holdfast {
+namespace holdfast::app {
 
 std::unique_ptr<Viewer>
 openViewer(const std::string& note)
@@ -26,4 +26,4 @@ openViewer(const std::string& note)
   return std::unique_ptr<Viewer>(open(note));
 }
 
-} // namespace holdfast
+} // namespace holdfast::app

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-namespace holdfast {
+namespace holdfast::app {
 
 struct ShownPatch {
   Patch patch;
@@ -39,7 +39,7 @@ public:
 /// \throw std::runtime_error in one line: built without, or no display.
 std::unique_ptr<Viewer> openViewer(const std::string& note);
 
-} // namespace holdfast
+} // namespace holdfast::app
 
 /// What the module exports; as openViewer(). The caller owns the result.
-extern "C" holdfast::Viewer* holdfastOpenViewer(const std::string& note);
+extern "C" holdfast::app::Viewer* holdfastOpenViewer(const std::string& note);

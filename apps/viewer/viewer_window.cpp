@@ -1,4 +1,4 @@
-#include "viewer.h"
+#include "live/viewer.h"
 
 #include <holdfast/patch/tessellation.h>
 
@@ -13,7 +13,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace holdfast { namespace {
+namespace holdfast::app { namespace {
 
 using pcl::visualization::PCLVisualizer;
 using pcl::visualization::PointPickingEvent;
@@ -214,10 +214,10 @@ ViewerWindow::update()
   return !window_.wasStopped();
 }
 
-}} // namespace holdfast
+}} // namespace holdfast::app
 
-holdfast::Viewer*
+holdfast::app::Viewer*
 holdfastOpenViewer(const std::string& note)
 {
-  return new holdfast::ViewerWindow(note);
+  return new holdfast::app::ViewerWindow(note);
 }

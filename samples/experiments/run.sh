@@ -5,7 +5,7 @@
 #   samples/experiments/run.sh HOLDFAST [RECORDINGS]
 #
 # HOLDFAST is the program; RECORDINGS a folder of recorded clouds, without which the
-# recorded halves of figure6 and noise are left as they are.
+# recorded half of figure6 is left as it is.
 set -euo pipefail
 holdfast=$(realpath "$1")
 recordings=${2:+$(realpath "$2")}
@@ -22,10 +22,10 @@ run() { # FOLDER ARGUMENTS
 }
 
 # Are the covariances right? By scene; by mode; by departure from the paper.
-run . calibration --trials 5000 --seed 7 --options default paper
-run modes calibration --trials 5000 --seed 7 --scene table2 robot-1.0 \
+run . consistency --trials 5000 --seed 7 --options default paper
+run modes consistency --trials 5000 --seed 7 --scene table2 robot-1.0 \
   --mode exact gauss_newton second_order stagewise
-run departures calibration --trials 5000 --seed 7 --scene robot-1.0 \
+run departures consistency --trials 5000 --seed 7 --scene robot-1.0 \
   --options without-ray without-debias without-surface-noise without-pca-normal \
   without-smooth-circle
 # The paper's table and figures, and two questions it leaves open.
@@ -35,5 +35,4 @@ run . neighborhoods --trials 5000 --seed 7
 if [[ -n $recordings ]]; then
   ln -s "$recordings" recordings
   run . figure6 --data recordings
-  run . noise --data recordings
 fi

@@ -1,4 +1,4 @@
-#include <holdfast/fit/boundary_fit.h>
+#include "boundary_fit.h"
 #include <holdfast/geometry/rotation.h>
 
 #include <Eigen/Geometry>

@@ -1,4 +1,4 @@
-#include <holdfast/fit/discrimination.h>
+#include "discrimination.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>

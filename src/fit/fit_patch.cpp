@@ -1,4 +1,4 @@
-#include <holdfast/fit/fit_patch.h>
+#include "fit_patch.h"
 
 #include <cmath>
 #include <stdexcept>

@@ -15,7 +15,7 @@
 //   in
 //                             registers
 //
-// The notation is that of holdfast/fit/kernel.h.
+// The notation is that of fit/kernel.h.
 
 HOLDFAST_INLINE Number
 dot(const Number a[3], const Number b[3])

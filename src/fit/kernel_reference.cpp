@@ -1,4 +1,4 @@
-#include <holdfast/fit/kernel.h>
+#include "kernel.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 // The kernel for every instruction set the compiler knows, chosen at run time
 // (Highway).
-#include <holdfast/fit/kernel.h>
+#include "kernel.h"
 
 #include <algorithm>
 #include <limits>

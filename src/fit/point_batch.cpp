@@ -1,5 +1,5 @@
+#include "surface_fit.h"
 #include <holdfast/fit/point_batch.h>
-#include <holdfast/fit/surface_fit.h>
 #include <holdfast/geometry/gaussian.h>
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-#include <holdfast/fit/levenberg_marquardt.h>
-#include <holdfast/fit/surface_fit.h>
+#include "surface_fit.h"
+#include "levenberg_marquardt.h"
 #include <holdfast/geometry/rotation.h>
 
 #include "fit/surface_start.h"

@@ -1,7 +1,7 @@
 // Closed-form starts of the surface fits.
 #pragma once
 
-#include <holdfast/fit/surface_fit.h>
+#include "surface_fit.h"
 
 namespace holdfast {
 

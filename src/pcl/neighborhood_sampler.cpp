@@ -1,6 +1,6 @@
 #include <holdfast/pcl/neighborhood_sampler.h>
 
-#include <holdfast/pcl/sampling_budget.h>
+#include "sampling_budget.h"
 
 #include "path_search.h"
 #include "pixel_disc.h"

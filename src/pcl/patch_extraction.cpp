@@ -1,14 +1,13 @@
 #include <holdfast/pcl/patch_extraction.h>
 
+#include "sampling_budget.h"
 #include <holdfast/patch/boundary.h>
-#include <holdfast/pcl/sampling_budget.h>
 #include <holdfast/sensor/constant_noise_model.h>
 
+#include "parallel/parallel_for.h"
 #include "point_gatherer.h"
 
 #include <pcl/common/point_tests.h>
-
-#include <omp.h>
 
 #include <algorithm>
 #include <atomic>
@@ -115,56 +114,7 @@ int
 checkedThreads(int threads)
 {
   requireValid(threads < 0 ? "the number of threads must not be negative" : "");
-  return threads > 0 ? threads : omp_get_max_threads();
-}
-
-/// Tells the caller how far the work is, from one thread at a time, never backwards.
-class ProgressReport {
-public:
-  ProgressReport(std::function<void(int, int)> tell, int total)
-  : tell_(std::move(tell)), total_(total)
-  {}
-
-  void oneDone()
-  {
-    if (!tell_)
-      return;
-    // Not an OpenMP critical section: no exception may leave one.
-    const std::lock_guard<std::mutex> lock(mutex_);
-    ++done_;
-    if (done_ % kEvery == 0 || done_ == total_)
-      tell_(done_, total_);
-  }
-
-private:
-  static constexpr int kEvery = 64;
-  std::function<void(int, int)> tell_;
-  std::mutex mutex_;
-  int total_;
-  int done_ = 0;
-};
-
-/// Calls work(item, thread) for every item below n. Exceptions must not leave a
-/// parallel region: the first one waits until its end.
-template <typename Work>
-void
-parallelFor(int n, int threads, Work&& work)
-{
-  std::exception_ptr error;
-  // One at a time, in order: who stops early then has the first ones.
-#pragma omp parallel for schedule(dynamic, 1) num_threads(threads)
-  for (int i = 0; i < n; ++i) {
-    try {
-      work(i, omp_get_thread_num());
-    }
-    catch (...) {
-#pragma omp critical(holdfast_error)
-      if (!error)
-        error = std::current_exception();
-    }
-  }
-  if (error)
-    std::rethrow_exception(error);
+  return threadCount(threads);
 }
 
 /// Looks at attempts in the order of their seeds, in whatever order the threads come to
@@ -242,7 +192,7 @@ struct PatchExtractor::Impl {
   Sensor sensor;
   double radius_m;
   std::optional<ValidationOptions> validation;
-  std::function<void(int, int)> progress;
+  Progress progress;
   int threads;
   PatchEstimator estimator;
   PointGatherer gatherer;
@@ -273,8 +223,7 @@ PatchExtractor::Impl::fitAround(const std::vector<Seed>& seeds,
     PointBatch batch;
   };
   std::vector<Workspace> workspaces(static_cast<std::size_t>(threads));
-  ProgressReport report(progress, static_cast<int>(seeds.size()));
-  parallelFor(static_cast<int>(seeds.size()), threads, [&](int i, int thread) {
+  const auto fit_one = [&](int i, int thread) {
     if (skip())
       return;
     const Seed& seed = seeds[i];
@@ -285,8 +234,8 @@ PatchExtractor::Impl::fitAround(const std::vector<Seed>& seeds,
     attempts[i].seed = seed.position;
     attempts[i].radius_m = radius_m;
     done(i);
-    report.oneDone();
-  });
+  };
+  parallelFor(static_cast<int>(seeds.size()), threads, fit_one, progress);
 }
 
 std::vector<Seed>

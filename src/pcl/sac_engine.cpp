@@ -1,4 +1,4 @@
-#include <holdfast/pcl/sac_model_patch_engine.h>
+#include <holdfast/pcl/impl/sac_engine.h>
 #include <holdfast/sensor/constant_noise_model.h>
 #include <holdfast/validation/residual.h>
 

@@ -5,7 +5,7 @@
 /// line, a plane or a circle for coordinates that carry the rounding of `float`.
 #pragma once
 
-#include <holdfast/fit/fit_patch.h>
+#include "fit/fit_patch.h"
 
 #include <optional>
 #include <vector>

@@ -1,8 +1,8 @@
 /// \file The surfaces that sample consensus can look for.
 #pragma once
 
-#include <holdfast/fit/kernel.h>
-#include <holdfast/pcl/sac_model_patch_engine.h>
+#include "fit/kernel.h"
+#include <holdfast/pcl/impl/sac_engine.h>
 
 #include "sac_minimal_solvers.h"
 

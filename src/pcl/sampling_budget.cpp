@@ -1,4 +1,4 @@
-#include <holdfast/pcl/sampling_budget.h>
+#include "sampling_budget.h"
 
 namespace holdfast {
 

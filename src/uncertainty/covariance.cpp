@@ -1,9 +1,11 @@
+#include "covariance.h"
+
+#include "second_order.h"
+#include "stagewise.h"
+
 #include <holdfast/geometry/gaussian.h>
 #include <holdfast/geometry/rotation.h>
-#include <holdfast/uncertainty/covariance.h>
 #include <holdfast/uncertainty/monte_carlo.h>
-#include <holdfast/uncertainty/second_order.h>
-#include <holdfast/uncertainty/stagewise.h>
 
 #include <Eigen/Cholesky>
 
@@ -206,6 +208,8 @@ curvatureInSigmas(const Patch& patch, const ParameterMatrix& covariance)
   return std::abs(patch.kappa[0]) / std::sqrt(covariance(k, k));
 }
 
+} // namespace
+
 FitStatus
 observability(const Patch& patch, const ParameterMatrix& covariance)
 {
@@ -221,26 +225,6 @@ observability(const Patch& patch, const ParameterMatrix& covariance)
   if (axisSigma(patch, covariance) > kUnobservableAngle)
     return FitStatus::AxisNotObservable;
   return FitStatus::Converged;
-}
-
-} // namespace
-
-std::string_view
-covarianceModeName(CovarianceMode mode)
-{
-  switch (mode) {
-  case CovarianceMode::Exact:
-    return "exact";
-  case CovarianceMode::GaussNewton:
-    return "gauss_newton";
-  case CovarianceMode::SecondOrder:
-    return "second_order";
-  case CovarianceMode::Stagewise:
-    return "stagewise";
-  case CovarianceMode::MonteCarlo:
-    return "monte_carlo";
-  }
-  return "unknown";
 }
 
 PatchCovariance
@@ -276,41 +260,6 @@ patchCovariance(const PatchFit& fit,
     result.mean_shift = terms.shift;
   }
   return result;
-}
-
-PatchEstimator::PatchEstimator(const FitOptions& options, CovarianceMode mode)
-: fitter_(options), mode_(mode)
-{}
-
-FitResult
-PatchEstimator::estimate(PointBatch& batch) const
-{
-  const PatchFit fit = fitter_.fit(batch);
-  FitResult result;
-  result.status = fit.status;
-  result.patch = fit.bounded.patch;
-  result.chi2 = 2.0 * fit.surface.cost;
-  result.chi2_dof = fit.points - kernel::parameterCount(fit.surface.surface.model);
-  result.points = fit.points;
-  result.invalid_points = fit.invalid_points;
-  result.iterations = fit.surface.iterations;
-  result.polish_steps = fit.surface.polish_steps;
-  result.null_space = fit.null_space;
-  if (fit.status == FitStatus::Converged) {
-    const PatchCovariance uncertainty = patchCovariance(fit, batch, fitter_, mode_);
-    result.covariance = uncertainty.covariance;
-    result.mean_shift = uncertainty.mean_shift;
-    result.status = observability(result.patch, result.covariance);
-    if (!isUsable(result.status))
-      result.covariance.resize(0, 0);
-  }
-  return result;
-}
-
-FitResult
-estimatePatch(PointBatch& batch, const FitOptions& options, CovarianceMode mode)
-{
-  return PatchEstimator(options, mode).estimate(batch);
 }
 
 } // namespace holdfast

@@ -1,5 +1,7 @@
-#include <holdfast/fit/fit_patch.h>
+#include "fit/fit_patch.h"
+#include "parallel/parallel_for.h"
 #include <holdfast/geometry/gaussian.h>
+
 #include <holdfast/uncertainty/monte_carlo.h>
 
 #include <optional>
@@ -83,7 +85,7 @@ monteCarloCovariance(const Patch& reference,
   const Model model = modelOf(batch);
   std::vector<std::optional<ParameterVector>> trials(
       static_cast<std::size_t>(monte_carlo.trials));
-  const auto work = [&](int trial) {
+  const auto work = [&](int trial, int) {
     thread_local PointBatch drawn;
     std::mt19937_64 generator =
         trialGenerator(monte_carlo.seed, static_cast<std::uint64_t>(trial));
@@ -93,7 +95,7 @@ monteCarloCovariance(const Patch& reference,
       trials[static_cast<std::size_t>(trial)] =
           pack(nearestRepresentation(fit.bounded.patch, reference));
   };
-  forEachIndex(monte_carlo.trials, monte_carlo.threads, work, monte_carlo.progress);
+  parallelFor(monte_carlo.trials, monte_carlo.threads, work, monte_carlo.progress);
 
   MonteCarloResult result;
   for (const auto& trial : trials) {

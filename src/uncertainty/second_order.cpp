@@ -1,6 +1,6 @@
+#include "second_order.h"
 #include <holdfast/geometry/gaussian.h>
 #include <holdfast/geometry/rotation.h>
-#include <holdfast/uncertainty/second_order.h>
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include <holdfast/uncertainty/stagewise.h>
+#include "stagewise.h"
 
 #include "uncertainty/stagewise_stages.h"
 

@@ -2,7 +2,7 @@
 // are in the paper's order; a rotation is r or, for types with revolute symmetry, r_xy.
 #pragma once
 
-#include <holdfast/fit/fit_patch.h>
+#include "fit/fit_patch.h"
 #include <holdfast/geometry/gaussian.h>
 #include <holdfast/geometry/pose.h>
 #include <holdfast/geometry/rotation.h>

@@ -4,7 +4,7 @@
 #include <holdfast/patch/boundary.h>
 #include <holdfast/patch/parameters.h>
 #include <holdfast/patch/tessellation.h>
-#include <holdfast/uncertainty/covariance.h>
+#include <holdfast/patch_estimator.h>
 #include <holdfast/version.h>
 
 #include <Eigen/Cholesky>

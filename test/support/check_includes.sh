@@ -10,14 +10,24 @@ cd "${1:-$(dirname "${BASH_SOURCE[0]}")/../..}"
 # other: the fit sees points and covariances, never where they came from.
 check='
 BEGIN {
+  allowed["ground"] = ""
   allowed["geometry"] = ""
+  allowed["parallel"] = "ground"
   allowed["patch"] = "geometry"
-  allowed["sensor"] = "geometry patch"
+  allowed["sensor"] = "ground geometry"
   allowed["fit"] = "geometry patch"
-  allowed["uncertainty"] = "geometry patch sensor fit"
-  allowed["validation"] = "geometry patch sensor fit uncertainty"
-  allowed["pcl"] = "geometry patch sensor fit uncertainty validation"
-  allowed["io"] = "geometry patch sensor fit uncertainty validation pcl"
+  uncertainty = "ground geometry parallel patch fit"
+  allowed["uncertainty"] = uncertainty
+  allowed["front"] = uncertainty " uncertainty"
+  allowed["validation"] = "geometry patch fit"
+  allowed["simulation"] = "ground geometry patch sensor"
+  allowed["evaluation"] = allowed["front"] " front validation sensor simulation"
+  allowed["pcl"] = allowed["front"] " front validation sensor"
+  allowed["io"] = allowed["pcl"] " pcl"
+  # Headers above the rooms: the front door, and what all may know.
+  room["patch_estimator"] = "front"
+  room["progress"] = "ground"
+  room["version"] = "ground"
   # Beside C++ standard headers, which have neither slash nor dot. What a public header
   # includes, every user of the core must have: only Eigen.
   core_headers_may = "^(Eigen/|[a-z_0-9]+$)"
@@ -27,9 +37,19 @@ function complain(why) {
   printf "%s:%d: %s\n", FILENAME, FNR, why
   bad = 1
 }
+function layer_of(path) {
+  if (path ~ /\//) {
+    sub(/\/.*/, "", path)
+    return path
+  }
+  sub(/\..*/, "", path)
+  return path in room ? room[path] : path
+}
 function check_ours(header) {
-  target = header
-  sub(/\/.*/, "", target)
+  # In the same folder.
+  if (header !~ /\// && $0 ~ /include[ \t]*"/)
+    return
+  target = layer_of(header)
   if (target in allowed && target != layer &&
       index(" " allowed[layer] " ", " " target " ") == 0)
     complain(layer " must not include " target)
@@ -42,7 +62,7 @@ function check_foreign(header) {
 FNR == 1 {
   layer = FILENAME
   sub(/^(include\/holdfast|src)\//, "", layer)
-  sub(/\/.*/, "", layer)
+  layer = layer_of(layer)
   if (!(layer in allowed))
     complain("unknown layer " layer)
 }

@@ -3,10 +3,10 @@
 
 #include "support/random.h"
 
+#include <holdfast/patch_estimator.h>
 #include <holdfast/pcl/conversions.h>
-#include <holdfast/sensor/calibration_scenes.h>
 #include <holdfast/sensor/stereo_noise_model.h>
-#include <holdfast/uncertainty/covariance.h>
+#include <holdfast/simulation/reference_scenes.h>
 #include <holdfast/validation/residual.h>
 
 #include <pcl/point_types.h>
@@ -23,7 +23,7 @@
 
 namespace holdfast::test {
 
-/// A patch of the calibration scenes seen by a Kinect, its points in random order among
+/// A patch of the reference scenes seen by a Kinect, its points in random order among
 /// clutter anywhere up to 0.2 m above and below its 0.2 x 0.2 m.
 struct ConsensusScene {
   Patch patch;
@@ -45,7 +45,7 @@ makeConsensusScene(PatchType type,
   // From nearly above: seen from aside, the points lie unevenly about a paraboloid's
   // axis, and the line its vertex is sought on is another.
   const double tilt = random.uniform(0.0, 0.2);
-  const CalibrationScene calibration =
+  const ReferenceScene calibration =
       robotScene(type, 1.0, tilt, random.uniform(0.0, 6.28));
   ConsensusScene scene;
   StereoNoiseModel::Parameters parameters;

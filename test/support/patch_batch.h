@@ -1,4 +1,4 @@
-/// \file Batches of noisy points on the patches of the calibration scenes.
+/// \file Batches of noisy points on the patches of the reference scenes.
 #pragma once
 
 #include "support/random.h"
@@ -6,8 +6,8 @@
 #include <holdfast/fit/options.h>
 #include <holdfast/fit/point_batch.h>
 #include <holdfast/patch/parameters.h>
-#include <holdfast/sensor/calibration_scenes.h>
 #include <holdfast/sensor/stereo_noise_model.h>
+#include <holdfast/simulation/reference_scenes.h>
 
 #include <algorithm>
 #include <cmath>
@@ -47,7 +47,7 @@ kinectNoise()
   return StereoNoiseModel(StereoNoiseModel::Parameters{});
 }
 
-/// The points of a calibration scene that hit its patch, without noise, and what noise
+/// The points of a reference scene that hit its patch, without noise, and what noise
 /// they would have.
 struct CleanSample {
   std::vector<Eigen::Vector3d> points;
@@ -56,7 +56,7 @@ struct CleanSample {
 };
 
 inline CleanSample
-cleanSample(const CalibrationScene& scene, double noise_scale = 1.0)
+cleanSample(const ReferenceScene& scene, double noise_scale = 1.0)
 {
   RangeImage image = castRays(scene.scene, scene.rays);
   attachNoise(image, kinectNoise());
@@ -82,11 +82,9 @@ noisy(const CleanSample& clean, std::mt19937_64& generator)
   return sample;
 }
 
-/// The points of a calibration scene that hit its patch, noise drawn once.
+/// The points of a reference scene that hit its patch, noise drawn once.
 inline Sample
-sampleScene(const CalibrationScene& scene,
-            double noise_scale,
-            std::mt19937_64& generator)
+sampleScene(const ReferenceScene& scene, double noise_scale, std::mt19937_64& generator)
 {
   return noisy(cleanSample(scene, noise_scale), generator);
 }

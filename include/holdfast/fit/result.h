@@ -33,7 +33,7 @@ std::string_view statusName(FitStatus status);
 /// True for the statuses that come with a patch and a finite covariance.
 bool isUsable(FitStatus status);
 
-/// Undetermined directions in the solver's parameters (holdfast/fit/kernel.h), one unit
+/// Undetermined directions in the solver's parameters (fit/kernel.h), one unit
 /// column each; rows are padded to six.
 using NullSpace = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::DontAlign, 6, 6>;
 

@@ -1,8 +1,9 @@
 /// \file The road from a cloud to patches: covariances, neighbourhoods, fits.
 #pragma once
 
+#include <holdfast/patch_estimator.h>
 #include <holdfast/pcl/neighborhood_sampler.h>
-#include <holdfast/uncertainty/covariance.h>
+#include <holdfast/progress.h>
 #include <holdfast/validation/checks.h>
 
 #include <functional>
@@ -24,7 +25,7 @@ struct ExtractionOptions {
   std::optional<ValidationOptions> validation;
   int threads = 0; ///< 0: all cores
   /// Called now and then with (done, total); from one thread at a time.
-  std::function<void(int, int)> progress;
+  Progress progress;
 };
 
 /// One fitted patch and where it came from.

@@ -1,15 +1,20 @@
 /// \file Sample consensus for the surfaces of patches, with the noise of every point.
 #pragma once
 
-#include <holdfast/pcl/sac_model_patch_engine.h>
+#include <holdfast/pcl/consensus_options.h>
+#include <holdfast/pcl/range_cloud.h>
+#include <holdfast/sensor/sensor.h>
 
 #include <pcl/sample_consensus/sac_model.h>
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 namespace holdfast {
+
+class PatchConsensus;
 
 /// A surface for PCL's sample consensus, fitted with the covariances of the points:
 ///
@@ -70,6 +75,8 @@ public:
                             const pcl::Indices& indices,
                             bool random = false);
 
+  ~SampleConsensusModelPatch() override;
+
   void setInputCloud(const PointCloudConstPtr& cloud) override;
 
   /// Covariances beside the cloud, one per point, m^2, in its frame; null: none.
@@ -80,10 +87,7 @@ public:
     return covariances_;
   }
 
-  void setNoiseModel(const NoiseModel::ConstPtr& noise)
-  {
-    engine_.setNoiseModel(noise);
-  }
+  void setNoiseModel(const NoiseModel::ConstPtr& noise);
 
   void setSensor(const Sensor& sensor)
   {
@@ -97,22 +101,13 @@ public:
   /// Options that make no sense are refused with PCL_ERROR.
   void setOptions(const ConsensusOptions& options);
 
-  const ConsensusOptions& getOptions() const
-  {
-    return engine_.options();
-  }
+  const ConsensusOptions& getOptions() const;
 
   /// The surface looked for.
-  SurfaceRequest getSurface() const
-  {
-    return engine_.surface();
-  }
+  SurfaceRequest getSurface() const;
 
   /// A value of pcl::SacModel or PatchSacModel.
-  pcl::SacModel getModelType() const override
-  {
-    return static_cast<pcl::SacModel>(engine_.modelType());
-  }
+  pcl::SacModel getModelType() const override;
 
   /// Empty when there is input to take samples from, else what is wrong with it.
   std::string misuse() const;
@@ -177,7 +172,7 @@ private:
   void updateCloud();
   std::optional<Patch> validSurface(const Eigen::VectorXf& model_coefficients) const;
 
-  PatchConsensus engine_;
+  std::unique_ptr<PatchConsensus> engine_;
   RangeCloud range_; ///< the input cloud with the covariances of its own points
   CovariancesConstPtr covariances_;
   std::optional<Pose> sensor_pose_;

@@ -4,7 +4,7 @@
 #include <holdfast/fit/options.h>
 #include <holdfast/fit/point_batch.h>
 #include <holdfast/patch/parameters.h>
-#include <holdfast/uncertainty/parallel.h>
+#include <holdfast/progress.h>
 
 #include <cstdint>
 #include <random>

@@ -2,6 +2,7 @@
 
 #include <holdfast/pcl/conversions.h>
 #include <holdfast/pcl/impl/input_check.hpp>
+#include <holdfast/pcl/impl/sac_engine.h>
 #include <holdfast/pcl/sac_model_patch.h>
 #include <holdfast/validation/residual.h>
 
@@ -28,13 +29,44 @@ SampleConsensusModelPatch<PointT>::SampleConsensusModelPatch(
     const PointCloudConstPtr& cloud,
     const pcl::Indices& indices,
     bool random)
-: Base(random), engine_(surface)
+: Base(random), engine_(std::make_unique<PatchConsensus>(surface))
 {
   model_name_ = "SampleConsensusModelPatch";
-  sample_size_ = engine_.sampleSize();
-  model_size_ = engine_.modelSize();
+  sample_size_ = engine_->sampleSize();
+  model_size_ = engine_->modelSize();
   this->setIndices(indices);
   SampleConsensusModelPatch::setInputCloud(cloud);
+}
+
+template <typename PointT>
+SampleConsensusModelPatch<PointT>::~SampleConsensusModelPatch() = default;
+
+template <typename PointT>
+void
+SampleConsensusModelPatch<PointT>::setNoiseModel(const NoiseModel::ConstPtr& noise)
+{
+  engine_->setNoiseModel(noise);
+}
+
+template <typename PointT>
+const ConsensusOptions&
+SampleConsensusModelPatch<PointT>::getOptions() const
+{
+  return engine_->options();
+}
+
+template <typename PointT>
+SurfaceRequest
+SampleConsensusModelPatch<PointT>::getSurface() const
+{
+  return engine_->surface();
+}
+
+template <typename PointT>
+pcl::SacModel
+SampleConsensusModelPatch<PointT>::getModelType() const
+{
+  return static_cast<pcl::SacModel>(engine_->modelType());
 }
 
 template <typename PointT>
@@ -79,7 +111,7 @@ SampleConsensusModelPatch<PointT>::updateCloud()
     cloud.covariances = *covariances_;
   if (sensor_pose_)
     cloud.sensor_pose = *sensor_pose_;
-  engine_.setCloud(cloud);
+  engine_->setCloud(cloud);
 }
 
 template <typename PointT>
@@ -88,7 +120,7 @@ SampleConsensusModelPatch<PointT>::setOptions(const ConsensusOptions& options)
 {
   const std::string error = validityError(options.fit);
   if (error.empty())
-    engine_.setOptions(options);
+    engine_->setOptions(options);
   else
     PCL_ERROR("[holdfast::%s::setOptions] %s!\n",
               getClassName().c_str(),
@@ -101,8 +133,8 @@ SampleConsensusModelPatch<PointT>::misuse() const
 {
   if (!input_)
     return "no input cloud";
-  if (!engine_.inputError().empty())
-    return engine_.inputError();
+  if (!engine_->inputError().empty())
+    return engine_->inputError();
   if (indices_->size() < sample_size_)
     return "a sample takes " + std::to_string(sample_size_) +
            " points, but there are " + std::to_string(indices_->size());
@@ -127,7 +159,7 @@ template <typename PointT>
 bool
 SampleConsensusModelPatch<PointT>::isSampleGood(const pcl::Indices& samples) const
 {
-  return engine_.isSample(samples);
+  return engine_->isSample(samples);
 }
 
 template <typename PointT>
@@ -145,14 +177,14 @@ SampleConsensusModelPatch<PointT>::validSurface(
 {
   if (!Base::isModelValid(model_coefficients))
     return std::nullopt;
-  const std::optional<Patch> surface = engine_.surfaceFrom(model_coefficients);
+  const std::optional<Patch> surface = engine_->surfaceFrom(model_coefficients);
   if (!surface || surface->type.surface == SurfaceType::Plane)
     return surface;
   const double curvature = surface->principalCurvatures().cwiseAbs().maxCoeff();
   const double radius =
       curvature > 0.0 ? 1.0 / curvature : std::numeric_limits<double>::max();
   const bool within = radius >= radius_min_ && radius <= radius_max_ &&
-                      curvature <= engine_.options().fit.max_curvature_per_m;
+                      curvature <= engine_->options().fit.max_curvature_per_m;
   return within ? surface : std::nullopt;
 }
 
@@ -162,7 +194,7 @@ SampleConsensusModelPatch<PointT>::computeModelCoefficients(
     const pcl::Indices& samples,
     Eigen::VectorXf& model_coefficients) const
 {
-  const std::optional<SurfaceCoefficients> solution = engine_.solve(samples);
+  const std::optional<SurfaceCoefficients> solution = engine_->solve(samples);
   // MSAC would wait forever for the distances of a model outside the user's limits.
   if (!solution || !isModelValid(*solution))
     return false;
@@ -181,7 +213,7 @@ SampleConsensusModelPatch<PointT>::optimizeModelCoefficients(
   optimized_coefficients = model_coefficients;
   if (!isUsable(fit.status))
     return;
-  const Eigen::VectorXf coefficients = engine_.coefficientsOf(fit.patch);
+  const Eigen::VectorXf coefficients = engine_->coefficientsOf(fit.patch);
   if (isModelValid(coefficients))
     optimized_coefficients = coefficients;
 }
@@ -194,7 +226,7 @@ SampleConsensusModelPatch<PointT>::estimatePatch(
 {
   const std::optional<Patch> surface = validSurface(model_coefficients);
   if (surface)
-    return engine_.estimatePatch(*surface, inliers);
+    return engine_->estimatePatch(*surface, inliers);
   PCL_ERROR("[holdfast::%s::estimatePatch] Given model is invalid!\n",
             getClassName().c_str());
   return {};
@@ -210,7 +242,7 @@ SampleConsensusModelPatch<PointT>::getDistancesToModel(
   const std::optional<Patch> surface = validSurface(model_coefficients);
   if (!surface)
     return;
-  distances = engine_.squaredDistances(*surface, *indices_);
+  distances = engine_->squaredDistances(*surface, *indices_);
   for (double& distance : distances)
     distance = std::sqrt(distance);
 }
@@ -227,7 +259,7 @@ SampleConsensusModelPatch<PointT>::selectWithinDistance(
   const std::optional<Patch> surface = validSurface(model_coefficients);
   if (!surface)
     return;
-  const std::vector<double> squared = engine_.squaredDistances(*surface, *indices_);
+  const std::vector<double> squared = engine_->squaredDistances(*surface, *indices_);
   for (std::size_t i = 0; i < squared.size(); ++i)
     if (std::sqrt(squared[i]) <= threshold) {
       inliers.push_back((*indices_)[i]);
@@ -244,7 +276,7 @@ SampleConsensusModelPatch<PointT>::countWithinDistance(
   const std::optional<Patch> surface = validSurface(model_coefficients);
   if (!surface)
     return 0;
-  const std::vector<double> squared = engine_.squaredDistances(*surface, *indices_);
+  const std::vector<double> squared = engine_->squaredDistances(*surface, *indices_);
   return static_cast<std::size_t>(
       std::count_if(squared.begin(), squared.end(), [threshold](double s) {
         return std::sqrt(s) <= threshold;
@@ -262,7 +294,7 @@ SampleConsensusModelPatch<PointT>::doSamplesVerifyModel(
   if (!surface)
     return false;
   const std::vector<double> squared =
-      engine_.squaredDistances(*surface, pcl::Indices(indices.begin(), indices.end()));
+      engine_->squaredDistances(*surface, pcl::Indices(indices.begin(), indices.end()));
   return std::all_of(squared.begin(), squared.end(), [threshold](double s) {
     return std::sqrt(s) <= threshold;
   });

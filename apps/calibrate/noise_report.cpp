@@ -1,0 +1,497 @@
+#include "noise_report.h"
+
+#include "console.h"
+
+#include <holdfast/io/config.h>
+#include <holdfast/sensor/stereo_noise_model.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <stdexcept>
+
+namespace holdfast::app {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Table = std::vector<std::vector<std::string>>;
+
+std::string
+digits(double value)
+{
+  return formatNumber("%#.3g", value);
+}
+
+/// With no more digits than mean anything.
+double
+rounded(double value)
+{
+  return std::stod(formatNumber("%.5g", value));
+}
+
+std::string
+valueText(const Estimate& estimate)
+{
+  return estimate.isKnown() ? digits(estimate.value) : "-";
+}
+
+std::string
+intervalText(const Estimate& estimate)
+{
+  return std::isfinite(estimate.low) ?
+             digits(estimate.low) + " to " + digits(estimate.high) :
+             "-";
+}
+
+std::string
+valueAndInterval(const Estimate& estimate)
+{
+  return valueText(estimate) + " (" + intervalText(estimate) + ")";
+}
+
+PointImage
+cameraFrame(const RangeCloud& cloud)
+{
+  PointImage image;
+  image.width = static_cast<int>(cloud.points->width);
+  image.height = static_cast<int>(cloud.points->height);
+  image.points.reserve(cloud.points->size());
+  for (const pcl::PointXYZ& point : *cloud.points) {
+    const Eigen::Vector3d q = point.getVector3fMap().cast<double>();
+    image.points.push_back(cloud.sensor_pose.toLocal(q).cast<float>());
+  }
+  return image;
+}
+
+double
+focalTimesBaseline(const Sensor& sensor)
+{
+  return sensor.disparity_focal_px * sensor.baseline_m;
+}
+
+/// Of the nominal sensor, or that of a Kinect where it has none.
+double
+nominalSigmaPoint(const Sensor& sensor)
+{
+  const auto* stereo = dynamic_cast<const StereoNoiseModel*>(sensor.noise.get());
+  const auto parameters =
+      stereo != nullptr ? stereo->parameters() : StereoNoiseModel::Parameters{};
+  return parameters.sigma_point_px;
+}
+
+/// "whole planes" or "squares of 64 px (8.2 cm)".
+std::string
+regionText(int size_px, const NoiseReport& report)
+{
+  if (size_px == 0)
+    return "whole planes";
+  const double size_m = size_px / report.sensor.camera.fx * report.found.mean_m;
+  return "squares of " + std::to_string(size_px) + " px (" +
+         formatNumber("%.1f cm)", 100.0 * size_m);
+}
+
+std::string
+headText(const NoiseReport& report)
+{
+  const NoiseCalibration& found = report.found;
+  const Sensor& sensor = report.sensor;
+  const std::string planes =
+      found.planes == 0 ? "small spots" :
+      found.planes == 1 ? "1 plane" :
+                          std::to_string(found.planes) + " planes";
+  return std::to_string(found.frames) + (found.frames == 1 ? " frame" : " frames") +
+         " of " + std::to_string(sensor.camera.width) + " x " +
+         std::to_string(sensor.camera.height) + ", sensor " + sensor.name +
+         ": disparity = " + formatNumber("%.4g", sensor.disparity_focal_px) + " px x " +
+         formatNumber("%.4g", sensor.baseline_m) + " m / depth\n" +
+         std::to_string(found.pixels) + " pixels of each are static and flat (" +
+         planes + "), " + formatNumber("%.2f to ", found.min_m) +
+         formatNumber("%.2f m away", found.max_m);
+}
+
+Table
+sigmaTable(const NoiseReport& report)
+{
+  const NoiseCalibration& found = report.found;
+  Table table{
+      {"disparity, px", "sigma", "95 % interval", "before rounding", "95 % interval"}};
+  const auto row =
+      [&table](const std::string& name, const Estimate& as_is, const Estimate& before) {
+        table.push_back({name,
+                         valueText(as_is),
+                         intervalText(as_is),
+                         valueText(before),
+                         intervalText(before)});
+      };
+  row("in a frame, about " + regionText(found.region_px, report),
+      found.sigmas.single,
+      found.before_rounding.single);
+  row("  temporal: from frame to frame",
+      found.sigmas.temporal,
+      found.before_rounding.temporal);
+  row("  fixed pattern: mean of the frames",
+      found.sigmas.fixed,
+      found.before_rounding.fixed);
+  row("  fixed pattern: by difference", found.fixed_from_difference, {});
+  row("step of the values", found.quantum, {});
+  row("across the rays", found.sigma_point, {});
+  return table;
+}
+
+Table
+sizeTable(const NoiseReport& report)
+{
+  Table table{
+      {"in a frame, by size of region", "regions", "sigma px", "95 % interval"}};
+  for (const RegionSizeRow& row : report.found.by_region_size)
+    table.push_back({regionText(row.size_px, report),
+                     std::to_string(row.regions),
+                     valueText(row.single),
+                     intervalText(row.single)});
+  return table;
+}
+
+Table
+depthTable(const NoiseReport& report)
+{
+  Table table{{"by depth, m",
+               "pixels",
+               "in a frame",
+               "95 % interval",
+               "temporal",
+               "95 % interval",
+               "fixed",
+               "95 % interval"}};
+  for (const DepthRow& row : report.found.by_depth) {
+    std::vector<std::string>& cells = table.emplace_back();
+    cells = {formatNumber("%.2f to ", row.min_m) + formatNumber("%.2f", row.max_m),
+             std::to_string(row.pixels)};
+    for (const Estimate* sigma :
+         {&row.sigmas.single, &row.sigmas.temporal, &row.sigmas.fixed}) {
+      cells.push_back(valueText(*sigma));
+      cells.push_back(intervalText(*sigma));
+    }
+  }
+  return table;
+}
+
+/// A step is a power of two or the like of a px; a small difference belongs to f b.
+std::string
+stepSentence(const NoiseReport& report)
+{
+  const Estimate& step = report.found.quantum;
+  if (!step.isKnown())
+    return "No step is seen: the disparities take any value, or depths are rounded "
+           "more "
+           "coarsely.";
+  const double parts = std::max(1.0, std::round(1.0 / step.value));
+  const double ratio = step.value * parts;
+  std::string text = "The disparities come in steps of " + digits(step.value) + " px";
+  if (std::abs(ratio - 1.0) > 0.03)
+    return text + ".";
+  text += ", 1/" + formatNumber("%.0f px", parts);
+  // What four digits of f b cannot express is no difference.
+  if (std::abs(ratio - 1.0) > 5e-4)
+    text += " if focal length x baseline is " +
+            formatNumber("%.4g", focalTimesBaseline(report.sensor) / ratio) +
+            " px m and not " + formatNumber("%.4g", focalTimesBaseline(report.sensor));
+  return text + ".";
+}
+
+std::string
+pointSentence(const NoiseReport& report)
+{
+  if (report.found.sigma_point.isKnown())
+    return "The points scatter across the rays of their pixels; this is taken as their "
+           "pointing error.";
+  return "The points lie exactly on the rays of their pixels, so that nothing can be "
+         "said about their pointing error: sigma_point_px stays " +
+         formatNumber("%.3g", nominalSigmaPoint(report.sensor)) + ".";
+}
+
+/// At twice the depth the noise is the same within 7 %.
+constexpr double kNegligibleExponent = 0.1;
+
+std::string
+depthSentence(const NoiseReport& report)
+{
+  const Estimate& exponent = report.found.depth_exponent;
+  const std::string power =
+      "in a frame it goes with depth^p, p = " + formatNumber("%.2f (", exponent.value) +
+      formatNumber("%.2f to ", exponent.low) + formatNumber("%.2f)", exponent.high);
+  if (!std::isfinite(exponent.low))
+    return "Too little to tell whether the disparity noise depends on the depth.";
+  if (std::max(std::abs(exponent.low), std::abs(exponent.high)) < kNegligibleExponent)
+    return "The disparity noise is the same at all depths: " + power + ".";
+  if (exponent.contains(0.0))
+    return "No dependence of the disparity noise on the depth is seen: " + power + ".";
+  return std::string("The disparity noise ") +
+         (exponent.value > 0.0 ? "grows" : "falls") + " with the depth: " + power +
+         ". The model, which has it constant, is right on average.";
+}
+
+/// Why small regions show less.
+std::string
+sizeSentence(const NoiseReport& report)
+{
+  if (report.found.planes == 0)
+    return "There is no large plane: these are flat spots of curved surfaces, in which "
+           "long waves of a fixed pattern do not show. Show the camera a wall, a table "
+           "or the floor.";
+  return "A small region takes the long waves of a fixed pattern into its plane. There "
+         "they are an error of the plane that its residual does not show; the sigma "
+         "about whole planes holds them too.";
+}
+
+std::vector<std::string>
+sentences(const NoiseReport& report)
+{
+  const NoiseCalibration& found = report.found;
+  std::vector<std::string> all;
+  if (found.frames == 1)
+    all.emplace_back("One frame: what changes with time and what stays cannot be told "
+                     "apart.");
+  else if (found.sigmas.fixed.high < found.fixed_from_difference.low ||
+           found.sigmas.fixed.low > found.fixed_from_difference.high)
+    all.emplace_back("The two values of the fixed pattern contradict each other: scene "
+                     "or sensor moved, or the sensor was warming up.");
+  all.push_back(sizeSentence(report));
+  all.push_back(depthSentence(report));
+  all.push_back(stepSentence(report));
+  all.push_back(pointSentence(report));
+  return all;
+}
+
+Json
+estimateJson(const Estimate& estimate)
+{
+  if (!estimate.isKnown())
+    return nullptr;
+  Json interval;
+  if (std::isfinite(estimate.low))
+    interval = {estimate.low, estimate.high};
+  return {{"value", estimate.value}, {"interval", interval}};
+}
+
+Json
+sigmasJson(const DisparitySigmas& sigmas)
+{
+  return {{"single_frame", estimateJson(sigmas.single)},
+          {"temporal", estimateJson(sigmas.temporal)},
+          {"fixed_pattern", estimateJson(sigmas.fixed)}};
+}
+
+/// One figure over the depth: points, and their intervals as vertical lines.
+void
+addSeries(Panel& panel,
+          const std::string& name,
+          const NoiseReport& report,
+          Estimate DisparitySigmas::*sigma,
+          double (*scale)(double depth, const Sensor& sensor))
+{
+  Series points{name, {}, {}, SeriesStyle::Markers};
+  std::vector<Series> bars;
+  for (const DepthRow& row : report.found.by_depth) {
+    const Estimate& estimate = row.sigmas.*sigma;
+    if (!estimate.isKnown())
+      continue;
+    const double factor = scale(row.mean_m, report.sensor);
+    points.x.push_back(row.mean_m);
+    points.y.push_back(factor * estimate.value);
+    if (std::isfinite(estimate.low))
+      bars.push_back({name,
+                      {row.mean_m, row.mean_m},
+                      {factor * estimate.low, factor * estimate.high}});
+  }
+  if (points.x.empty())
+    return;
+  panel.series.push_back(points);
+  panel.series.insert(panel.series.end(), bars.begin(), bars.end());
+}
+
+double
+disparityScale(double, const Sensor&)
+{
+  return 1.0;
+}
+
+/// sigma_z = z^2 / (f b) sigma_d, in mm.
+double
+depthScale(double depth, const Sensor& sensor)
+{
+  return 1e3 * depth * depth / focalTimesBaseline(sensor);
+}
+
+Panel
+depthPanel(const NoiseReport& report,
+           const std::string& title,
+           const std::string& unit,
+           double (*scale)(double depth, const Sensor& sensor))
+{
+  Panel panel;
+  panel.title = title;
+  panel.x = {"depth (m)"};
+  panel.y = {"standard deviation (" + unit + ")"};
+  const NoiseCalibration& found = report.found;
+  Series model{"model", {}, {}, SeriesStyle::DashedLine};
+  constexpr int kSteps = 40;
+  for (int i = 0; i <= kSteps; ++i) {
+    const double z = found.min_m + (found.max_m - found.min_m) * i / kSteps;
+    model.x.push_back(z);
+    model.y.push_back(scale(z, report.sensor) * found.sigmas.single.value);
+  }
+  panel.series.push_back(model);
+  addSeries(panel, "in a frame", report, &DisparitySigmas::single, scale);
+  addSeries(panel, "temporal", report, &DisparitySigmas::temporal, scale);
+  return panel;
+}
+
+SensorComments
+commentsOf(const NoiseReport& report)
+{
+  const NoiseCalibration& found = report.found;
+  SensorComments comments;
+  comments[""] = "Measured by `holdfast calibrate` in " + std::to_string(found.frames) +
+                 (found.frames == 1 ? " frame, " : " frames, ") +
+                 std::to_string(found.pixels) +
+                 " pixels of each. In brackets: 95 % intervals.";
+  comments["camera"] = "Of sensor " + report.sensor.name +
+                       " where its rays fit the points of the frames, else recovered "
+                       "from them.";
+  comments["range"] = "Of sensor " + report.sensor.name +
+                      "; the frames held depths "
+                      "from " +
+                      formatNumber("%.2f", found.min_m) + " to " +
+                      formatNumber("%.2f m.", found.max_m);
+  comments["disparity"] = "Baseline and focal length of sensor " + report.sensor.name +
+                          ". " + stepSentence(report);
+  std::string disparity =
+      "Scatter about " + regionText(found.region_px, report) +
+      " within a frame, with the rounding: " + valueAndInterval(found.sigmas.single) +
+      ".";
+  if (found.before_rounding.single.isKnown())
+    disparity +=
+        " Before rounding: " + valueAndInterval(found.before_rounding.single) + ".";
+  if (found.sigmas.temporal.isKnown())
+    disparity += " Only " + valueAndInterval(found.sigmas.temporal) +
+                 " of it changes from frame to frame, " +
+                 valueAndInterval(found.sigmas.fixed) + " is a fixed pattern.";
+  comments["noise.sigma_disparity_px"] = disparity + " " + depthSentence(report);
+  comments["noise.sigma_point_px"] =
+      found.sigma_point.isKnown() ?
+          "Scatter across the rays: " + valueAndInterval(found.sigma_point) + "." :
+          pointSentence(report);
+  return comments;
+}
+
+} // namespace
+
+NoiseReport
+measureNoise(const std::vector<RangeCloud>& clouds, const Sensor& sensor, int region_px)
+{
+  std::vector<PointImage> frames;
+  for (const RangeCloud& cloud : clouds)
+    frames.push_back(cameraFrame(cloud));
+  NoiseCalibrationOptions options;
+  options.camera = sensor.camera;
+  options.baseline_m = sensor.baseline_m;
+  options.focal_px = sensor.disparity_focal_px;
+  options.region_px = region_px;
+  NoiseReport report{calibrateNoise(frames, options), sensor};
+  report.sensor.camera.width = frames.front().width;
+  report.sensor.camera.height = frames.front().height;
+  switch (report.found.status) {
+  case NoiseCalibrationStatus::NothingStatic:
+    throw std::runtime_error(
+        "nothing rests in most of the frames; did the camera move?");
+  case NoiseCalibrationStatus::NothingFlat:
+    throw std::runtime_error(
+        "nothing large and flat to measure on; show the camera a wall, a table or the "
+        "floor");
+  case NoiseCalibrationStatus::Ok:
+    break;
+  }
+  return report;
+}
+
+std::string
+noiseReportText(const NoiseReport& report)
+{
+  std::string text = headText(report) + "\n\n" + formatTable(sigmaTable(report)) +
+                     "\n" + formatTable(sizeTable(report)) + "\n" +
+                     formatTable(depthTable(report)) + "\n";
+  for (const std::string& sentence : sentences(report))
+    text += sentence + "\n";
+  return text;
+}
+
+Json
+noiseReportJson(const NoiseReport& report)
+{
+  const NoiseCalibration& found = report.found;
+  Json sizes = Json::array(), depths = Json::array();
+  for (const RegionSizeRow& row : found.by_region_size)
+    sizes.push_back({{"size_px", row.size_px == 0 ? Json() : Json(row.size_px)},
+                     {"regions", row.regions},
+                     {"single_frame", estimateJson(row.single)}});
+  for (const DepthRow& row : found.by_depth) {
+    Json json = {{"min_m", row.min_m},
+                 {"max_m", row.max_m},
+                 {"mean_m", row.mean_m},
+                 {"pixels", row.pixels}};
+    json.update(sigmasJson(row.sigmas));
+    depths.push_back(json);
+  }
+  return {{"sensor", report.sensor.name},
+          {"focal_px", report.sensor.disparity_focal_px},
+          {"baseline_m", report.sensor.baseline_m},
+          {"frames", found.frames},
+          {"pixels", found.pixels},
+          {"planes", found.planes},
+          {"region_px", found.region_px == 0 ? Json() : Json(found.region_px)},
+          {"depth_range_m", {found.min_m, found.max_m}},
+          {"sigma_disparity_px", sigmasJson(found.sigmas)},
+          {"before_rounding_px", sigmasJson(found.before_rounding)},
+          {"fixed_pattern_by_difference_px", estimateJson(found.fixed_from_difference)},
+          {"quantum_px", estimateJson(found.quantum)},
+          {"sigma_point_px", estimateJson(found.sigma_point)},
+          {"depth_exponent", estimateJson(found.depth_exponent)},
+          {"by_region_size", sizes},
+          {"by_depth", depths},
+          {"remarks", sentences(report)}};
+}
+
+Plot
+noiseReportPlot(const NoiseReport& report)
+{
+  return {{depthPanel(report, "Disparity, with 95 % intervals", "px", disparityScale),
+           depthPanel(report, "The same as depth", "mm", depthScale)},
+          2};
+}
+
+void
+saveCalibratedSensor(const std::string& path, const NoiseReport& report)
+{
+  const NoiseCalibration& found = report.found;
+  StereoNoiseModel::Parameters noise;
+  noise.sigma_disparity_px = rounded(found.sigmas.single.value);
+  noise.sigma_point_px = found.sigma_point.isKnown() ?
+                             rounded(found.sigma_point.value) :
+                             nominalSigmaPoint(report.sensor);
+  noise.baseline_m = report.sensor.baseline_m;
+  noise.focal_px = report.sensor.disparity_focal_px;
+  Sensor sensor = report.sensor;
+  sensor.name = std::filesystem::path(path).stem().string();
+  sensor.disparity_quantum_px =
+      found.quantum.isKnown() ? rounded(found.quantum.value) : 0.0;
+  sensor.noise = std::make_shared<const StereoNoiseModel>(noise);
+  saveSensor(path,
+             sensor,
+             {{"sigma_disparity_px", noise.sigma_disparity_px},
+              {"sigma_point_px", noise.sigma_point_px},
+              {"baseline_m", noise.baseline_m},
+              {"focal_px", noise.focal_px}},
+             commentsOf(report));
+}
+
+} // namespace holdfast::app

@@ -1,0 +1,50 @@
+#include "scene.h"
+
+#include <holdfast/sensor/stereo_noise_model.h>
+
+#include <memory>
+
+namespace holdfast::app {
+
+NoiseModel::ConstPtr
+kinectNoise()
+{
+  return std::make_shared<StereoNoiseModel>(StereoNoiseModel::Parameters{});
+}
+
+PointBatch
+noiseFreeBatch(const Scene& scene, const RayGrid& rays, const NoiseModel& noise)
+{
+  RangeImage image = castRays(scene, rays);
+  attachNoise(image, noise);
+  PointBatch batch;
+  batch.clear(scene.patches.front().c);
+  for (std::size_t i = 0; i < image.truth.size(); ++i)
+    if (image.hits[i] == 0)
+      batch.add(image.truth[i], image.covariances[i]);
+  return batch;
+}
+
+RangeCloud
+cloudOf(const RangeImage& image)
+{
+  auto points = std::make_shared<pcl::PointCloud<pcl::PointXYZ>>(
+      static_cast<std::uint32_t>(image.width),
+      static_cast<std::uint32_t>(image.height));
+  points->is_dense = false;
+  for (std::size_t i = 0; i < points->size(); ++i)
+    (*points)[i].getVector3fMap() = image.points[i].cast<float>();
+  RangeCloud cloud;
+  cloud.points = points;
+  cloud.sensor_pose = image.sensor_pose;
+  return cloud;
+}
+
+void
+addMeanAndVariance(Json& row, const std::string& key, const MeanAndVariance& value)
+{
+  row[key + "_mean"] = value.mean;
+  row[key + "_variance"] = value.variance;
+}
+
+} // namespace holdfast::app

@@ -1,0 +1,236 @@
+#include "commands.h"
+#include "console.h"
+#include "fit_settings.h"
+#include "patch_output.h"
+#include "summary.h"
+
+#include <holdfast/io/atomic_file.h>
+#include <holdfast/io/patch_io.h>
+#include <holdfast/pcl/intrinsics.h>
+#include <holdfast/pcl/patch_estimation.h>
+
+#include <CLI/CLI.hpp>
+
+#include <filesystem>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <optional>
+
+namespace holdfast::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kExamples = R"(Examples:
+  holdfast fit scene.pcd
+      patches all over the cloud, as a table
+  holdfast fit clouds/ -o results --radius 0.04 --spacing 0.02
+      every cloud of a folder; NAME.patches.json, .pcd and .ply for each
+  holdfast fit depth.png --depth-scale 5000 --sensor kinect_v1 --json - > patches.json
+      a depth image in units of 0.2 mm
+  holdfast fit can.pcd --whole --surface cylinder --json -
+      one cylinder to all points
+  holdfast fit floor.pcd --surface plane --boundary rectangle --seeds 200 \
+      --seed-strategy poisson --random-seed 7
+      at most 200 planes bounded by rectangles
+
+Covariances of the points come from the field 'covariance' of a PCD (six floats xx xy xz
+yy yz zz, m^2), else from the sensor; the sensor's pose comes from VIEWPOINT. In the
+table, sigma of the normal is its rms angle and sigma of the centre its rms distance from
+where a cloud without noise would have put them. A cloud that yields no patch counts as
+failed.
+)";
+
+/// Where the results go.
+class Output {
+public:
+  explicit Output(const FitSettings& settings) : settings_(settings)
+  {
+    if (!settings.json_path.empty() && settings.json_path != "-")
+      json_.emplace(settings.json_path);
+    if (!settings.output_folder.empty())
+      checkFolder(settings.output_folder);
+  }
+
+  void write(const PatchReport& report)
+  {
+    if (!settings_.output_folder.empty())
+      writeFiles(report);
+    if (settings_.json_path == "-")
+      writeJson(std::cout, report, JsonLayout::OneLine);
+    else if (!settings_.quiet)
+      std::cout << summaryTable(report) << std::flush;
+    if (json_) {
+      writeJson(json_->stream(), report, JsonLayout::OneLine);
+      has_json_ = true;
+    }
+  }
+
+  /// The JSON file appears only if a cloud has got into it.
+  void finish()
+  {
+    if (has_json_)
+      json_->commit();
+  }
+
+private:
+  void writeFiles(const PatchReport& report)
+  {
+    const std::string stem = fs::path(report.cloud).stem().string();
+    const auto [owner, is_new] = written_.emplace(stem, report.cloud);
+    if (!is_new)
+      throw std::runtime_error(report.cloud + ": its results would replace those of " +
+                               owner->second);
+    writePatchFiles(report, settings_.output_folder, stem);
+  }
+
+  const FitSettings& settings_;
+  std::optional<AtomicFile> json_;
+  bool has_json_ = false;
+  std::map<std::string, std::string> written_; ///< cloud by the name of its results
+};
+
+/// \return true when every point had a valid covariance.
+bool
+checkCovariances(const std::string& path, const RangeCloud& cloud)
+{
+  const int invalid = countInvalidCovariances(cloud);
+  if (invalid == 0)
+    return true;
+  const int valid = countValidPoints(cloud);
+  const std::string what = path + ": " + std::to_string(invalid) + " of " +
+                           std::to_string(valid) +
+                           " covariances are not finite or not positive semi-definite";
+  if (invalid == valid)
+    throw std::runtime_error(what);
+  printError(what + "; those points are left out");
+  return false;
+}
+
+void
+checkPatches(const PatchReport& report)
+{
+  if (!report.result.patches.empty())
+    return;
+  const std::string rejected = rejectedText(report.result);
+  throw std::runtime_error(report.cloud +
+                           ": no patch: " + (rejected.empty() ? "no seed" : rejected));
+}
+
+void
+printNotices(const std::string& path, const std::vector<std::string>& notices)
+{
+  for (const std::string& notice : notices)
+    printNotice(path + ": " + notice);
+}
+
+/// Notices about the cloud that only the options can give.
+std::vector<std::string>
+neighborhoodNotices(const FitSettings& settings, const RangeCloud& cloud)
+{
+  if (settings.whole || cloud.points->height > 1 ||
+      settings.extraction.options.sampler.neighborhood != Neighborhood::Disc)
+    return {};
+  return {"not organized: balls take the place of discs"};
+}
+
+/// Patches all over the cloud, by the class that PCL pipelines use.
+ExtractionResult
+estimatePatches(const RangeCloud& cloud,
+                const Sensor& sensor,
+                const ExtractionOptions& options)
+{
+  PatchEstimation<pcl::PointXYZ> estimation;
+  estimation.setInputCloud(cloud.points);
+  if (!cloud.covariances.empty())
+    estimation.setInputCovariances(
+        std::make_shared<const Covariances>(cloud.covariances));
+  estimation.setSensor(sensor);
+  estimation.setSensorPose(cloud.sensor_pose);
+  estimation.setOptions(options);
+  estimation.setSeedsFromSampler(true);
+  pcl::PointCloud<PatchPoint> points;
+  estimation.compute(points);
+  ExtractionResult result = sortOut(estimation.getResults());
+  result.notices = estimation.getNotices();
+  return result;
+}
+
+ExtractionResult
+extract(const RangeCloud& cloud, const Sensor& sensor, const FitSettings& settings)
+{
+  ProgressBar bar("fitting", !settings.quiet);
+  ExtractionOptions options = settings.extraction.options;
+  options.progress = [&bar](int done, int total) { bar.update(done, total); };
+  return settings.whole ? extractWhole(cloud, sensor, options) :
+                          estimatePatches(cloud, sensor, options);
+}
+
+/// The road from a file to its patches.
+/// \return false when the results are written but something was wrong with the cloud.
+bool
+fitCloud(const std::string& path,
+         const Sensor& nominal,
+         const FitSettings& settings,
+         Output& output)
+{
+  PatchReport report;
+  report.cloud = path;
+  report.options = settings.extraction.options;
+  report.whole = settings.whole;
+
+  const Stopwatch loading;
+  CloudFileInfo info;
+  const RangeCloud cloud = loadCloud(path, loadOptions(settings.input, nominal), &info);
+  std::string intrinsics_notice;
+  report.sensor = matchedSensor(nominal, cloud, &intrinsics_notice);
+  report.sensor_pose = cloud.sensor_pose;
+  report.load_ms = loading.milliseconds();
+  const bool clean = checkCovariances(path, cloud);
+
+  const Stopwatch fitting;
+  report.result = extract(cloud, report.sensor, settings);
+  report.fit_ms = fitting.milliseconds();
+
+  if (!settings.quiet) {
+    printNotices(path, inputNotices(settings.input, info));
+    if (!intrinsics_notice.empty())
+      printNotices(path, {intrinsics_notice});
+    printNotices(path, neighborhoodNotices(settings, cloud));
+    printNotices(path, report.result.notices);
+  }
+  checkPatches(report);
+  output.write(report);
+  return clean;
+}
+
+int
+runFit(const CLI::App& command, FitSettings& settings)
+{
+  finishExtractionOptions(command, settings.extraction);
+  const Sensor sensor = loadSensorOption(settings.input.sensor_name);
+  Output output(settings);
+  const int exit_code =
+      forEachCloud(settings.input.clouds, [&](const std::string& path) {
+        return fitCloud(path, sensor, settings, output);
+      });
+  output.finish();
+  return exit_code;
+}
+
+} // namespace
+
+void
+addFitCommand(CLI::App& app, int& exit_code)
+{
+  CLI::App* command =
+      app.add_subcommand("fit", "Fit bounded patches with covariance to clouds");
+  command->footer(kExamples);
+  const auto settings = std::make_shared<FitSettings>();
+  addFitOptions(*command, *settings);
+  command->callback(
+      [command, settings, &exit_code] { exit_code = runFit(*command, *settings); });
+}
+
+} // namespace holdfast::app

@@ -1,0 +1,97 @@
+#include "fit_settings.h"
+
+#include "command_line.h"
+
+#include <CLI/CLI.hpp>
+
+namespace holdfast::app {
+namespace {
+
+const Choices<SeedStrategy> kSeedStrategies{{"grid", SeedStrategy::Grid},
+                                            {"random", SeedStrategy::Random},
+                                            {"poisson", SeedStrategy::Poisson}};
+
+void
+addSeedOptions(CLI::App& command, SamplerOptions& sampler)
+{
+  const std::string group = "Seeds and neighbourhoods";
+  command.add_option("--spacing", sampler.spacing_m, "Distance between seeds, metres")
+      ->check(positiveNumber("M"))
+      ->type_name("")
+      ->capture_default_str()
+      ->group(group);
+  command
+      .add_option("--seeds",
+                  sampler.max_seeds,
+                  "Most seeds; default: as --spacing gives")
+      ->check(CLI::Range(1, 100000000, "N"))
+      ->type_name("")
+      ->group(group);
+  addChoice(
+      command,
+      "--seed-strategy",
+      sampler.strategy,
+      kSeedStrategies,
+      "Where seeds lie: on a regular grid, anywhere, or anywhere but never closer "
+      "than the spacing")
+      ->default_str("grid")
+      ->group(group);
+  command
+      .add_option("--max-time",
+                  sampler.max_time_s,
+                  "Stop after this time, seconds; how many patches that are depends on "
+                  "the computer")
+      ->check(positiveNumber("S"))
+      ->type_name("")
+      ->group(group);
+}
+
+void
+addOutputOptions(CLI::App& command, FitSettings& settings)
+{
+  command
+      .add_option(
+          "-o,--output",
+          settings.output_folder,
+          "Write NAME.patches.json, NAME.patches.pcd (points with normals, parameters "
+          "and covariances) and NAME.patches.ply (coloured mesh) here")
+      ->type_name("DIR")
+      ->group("Output");
+  command
+      .add_option("--json",
+                  settings.json_path,
+                  "Write JSON to this file, or with - to standard output and nothing "
+                  "else there; one object per cloud, each on a line of its own")
+      ->type_name("FILE")
+      ->group("Output");
+  command
+      .add_flag("--quiet", settings.quiet, "Errors only: no table, notices or progress")
+      ->group("Output");
+}
+
+} // namespace
+
+void
+addFitOptions(CLI::App& command, FitSettings& settings)
+{
+  addInputOptions(command, settings.input);
+  command.add_flag("--whole", settings.whole, "One patch to all points of the cloud")
+      ->group("Patches");
+  addExtractionOptions(command, settings.extraction);
+  addSeedOptions(command, settings.extraction.options.sampler);
+  addOutputOptions(command, settings);
+  exclude(command,
+          "--whole",
+          {"--radius",
+           "--spacing",
+           "--seeds",
+           "--max-patches",
+           "--max-area",
+           "--max-time",
+           "--neighborhood",
+           "--k",
+           "--seed-strategy"});
+  tidyHelp(command);
+}
+
+} // namespace holdfast::app

@@ -1,0 +1,24 @@
+/// \file The options of `holdfast fit`.
+#pragma once
+
+#include "extraction_options.h"
+#include "input_options.h"
+
+#include <string>
+
+namespace holdfast::app {
+
+/// Everything the command line of `holdfast fit` decides.
+struct FitSettings {
+  InputOptions input;
+  bool whole = false;
+  ExtractionSettings extraction;
+  std::string output_folder; ///< empty: no files
+  std::string json_path; ///< empty: none; "-": standard output
+  bool quiet = false;
+};
+
+/// Adds the options to the command. `settings` must outlive the parsing.
+void addFitOptions(CLI::App& command, FitSettings& settings);
+
+} // namespace holdfast::app

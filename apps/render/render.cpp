@@ -1,0 +1,391 @@
+#include "commands.h"
+#include "console.h"
+#include "render_scene.h"
+#include "render_settings.h"
+#include "stroke_font.h"
+
+#include <holdfast/geometry/constants.h>
+#include <holdfast/io/atomic_file.h>
+#include <holdfast/io/patch_io.h>
+#include <holdfast/patch/tessellation.h>
+#include <holdfast/simulation/reference_scenes.h>
+
+#include <pcl/common/point_tests.h>
+#include <pcl/io/pcd_io.h>
+#include <pcl/io/ply_io.h>
+
+#include <CLI/CLI.hpp>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <memory>
+
+namespace holdfast::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kExamples = R"(Examples:
+  holdfast fit scene.pcd -o results
+  holdfast render results/scene.patches.json -o scene.png
+      the cloud as the sensor sees it, with patches coloured by type
+  holdfast render results/scene.patches.json -o sure.png --color sigma-normal
+      where normals are sure and where they are not
+  holdfast render results/scene.patches.json -o top.png --view 0,90 --zoom 2
+      from straight above, the middle twice as large
+  holdfast render results/*.patches.json -o sheet.png --size 1600x1200
+      a sheet of several results
+  holdfast render --types -o types.png
+      the ten types of patches
+
+Points have the colours of the cloud file (rgb), else they are grey and shaded. Scales
+are logarithmic and end where 5 % of the patches lie beyond. "Above" is along the z axis
+of the cloud, or upwards in the image where the cloud is in the frame of its camera.
+)";
+
+constexpr int kMargin = 12; // px, about the legend
+constexpr int kTop = 4; // px, above titles
+constexpr int kTitleHeight = 20; // px, of one line
+
+/// One result as it is drawn.
+struct Subject {
+  std::string title;
+  std::vector<ExtractedPatch> patches;
+  PicturePoints points;
+  Pose sensor_pose;
+  bool seen = false; ///< by a camera in that pose
+};
+
+PatchReport
+readResult(const std::string& path)
+{
+  std::error_code ignored;
+  if (fs::is_directory(path, ignored))
+    throw std::runtime_error(path + ": is a directory, no result");
+  errno = 0;
+  std::ifstream file(path, std::ios::binary);
+  if (!file)
+    throw std::runtime_error(path + ": cannot be read: " + std::strerror(errno));
+  const std::string text{std::istreambuf_iterator<char>(file),
+                         std::istreambuf_iterator<char>()};
+  try {
+    PatchReport report = readJson(text);
+    if (report.result.patches.empty())
+      throw std::runtime_error("has no patch");
+    for (const ExtractedPatch& patch : report.result.patches)
+      if (const std::string error = validityError(patch.fit.patch); !error.empty())
+        throw std::runtime_error("has an impossible patch: " + error);
+    return report;
+  }
+  catch (const std::exception& error) {
+    throw std::runtime_error(path + ": " + error.what());
+  }
+}
+
+/// The cloud of a result, which may have moved together with it.
+std::string
+findCloud(const std::string& result, const std::string& cloud)
+{
+  const fs::path folder = fs::path(result).parent_path();
+  for (const fs::path& candidate :
+       {fs::path(cloud), folder / cloud, folder / fs::path(cloud).filename()}) {
+    std::error_code ignored;
+    if (fs::is_regular_file(candidate, ignored))
+      return candidate.string();
+  }
+  throw std::runtime_error(result + ": its cloud " + cloud +
+                           " is neither here nor beside it: --cloud FILE tells where");
+}
+
+/// The colours in a PCD or PLY file, or nothing. Our own reader keeps coordinates only.
+pcl::PointCloud<pcl::RGB>
+readColors(const std::string& path, const CloudFileInfo& info)
+{
+  pcl::PointCloud<pcl::RGB> colors;
+  const auto has = [&info](const char* field) {
+    return std::find(info.fields.begin(), info.fields.end(), field) !=
+           info.fields.end();
+  };
+  if (has("rgb") || has("rgba"))
+    pcl::io::loadPCDFile(path, colors);
+  else if (has("red") && has("green") && has("blue"))
+    pcl::io::loadPLYFile(path, colors);
+  return colors;
+}
+
+PicturePoints
+picturePoints(const RangeCloud& cloud, const pcl::PointCloud<pcl::RGB>& colors)
+{
+  PicturePoints points;
+  for (std::size_t i = 0; i < cloud.points->size(); ++i) {
+    const pcl::PointXYZ& point = (*cloud.points)[i];
+    if (!pcl::isFinite(point))
+      continue;
+    points.positions.emplace_back(point.getVector3fMap().cast<double>());
+    if (colors.size() == cloud.points->size())
+      points.colors.push_back({colors[i].r, colors[i].g, colors[i].b});
+  }
+  return points;
+}
+
+/// False for scans from all sides and clouds whose file does not tell the sensor's
+/// pose: no depth camera sees more than 45 degrees to a side.
+bool
+isSeenFrom(const Pose& sensor, const std::vector<Eigen::Vector3d>& points)
+{
+  const auto aside =
+      std::count_if(points.begin(), points.end(), [&](const auto& point) {
+        const Eigen::Vector3d q = sensor.toLocal(point);
+        return q.head<2>().cwiseAbs().maxCoeff() > q.z();
+      });
+  return 10 * static_cast<std::size_t>(aside) < points.size();
+}
+
+/// At most `count` of the patches, spread evenly over their order.
+std::vector<ExtractedPatch>
+evenShare(const std::vector<ExtractedPatch>& patches, std::size_t count)
+{
+  if (count >= patches.size())
+    return patches;
+  std::vector<ExtractedPatch> share;
+  for (std::size_t i = 0; i < count; ++i)
+    share.push_back(patches[i * patches.size() / count]);
+  return share;
+}
+
+Subject
+loadSubject(const std::string& result, const RenderSettings& settings)
+{
+  const PatchReport report = readResult(result);
+  const std::string path =
+      settings.cloud.empty() ? findCloud(result, report.cloud) : settings.cloud;
+  const Sensor sensor = loadSensorOption(settings.input.sensor_name);
+  CloudFileInfo info;
+  const RangeCloud cloud = loadCloud(path, loadOptions(settings.input, sensor), &info);
+
+  Subject subject;
+  subject.patches = report.result.patches;
+  if (settings.max_patches)
+    subject.patches =
+        evenShare(subject.patches, static_cast<std::size_t>(*settings.max_patches));
+  subject.title = fs::path(path).filename().string() + ", " +
+                  std::to_string(subject.patches.size()) +
+                  (subject.patches.size() == 1 ? " patch" : " patches");
+  subject.points = picturePoints(cloud, readColors(path, info));
+  subject.sensor_pose = cloud.sensor_pose;
+  subject.seen = isSeenFrom(cloud.sensor_pose, subject.points.positions);
+  if (!subject.seen && !settings.aside)
+    printNotice(path + ": not seen from a sensor, so drawn as with --view iso");
+  return subject;
+}
+
+/// The middle of the points.
+Eigen::Vector3d
+centroid(const std::vector<Eigen::Vector3d>& points)
+{
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& point : points)
+    sum += point;
+  return sum / static_cast<double>(points.size());
+}
+
+View
+viewFromAside(const Subject& subject, const Aside& aside)
+{
+  const Eigen::Matrix3d& R = subject.sensor_pose.R;
+  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+  if (subject.seen && R.isIdentity()) // the frame of the camera
+    up = -Eigen::Vector3d::UnitY();
+  Eigen::Vector3d front = Eigen::Vector3d::UnitX();
+  if (subject.seen) {
+    const Eigen::Vector3d towards_sensor =
+        subject.sensor_pose.c - centroid(subject.points.positions);
+    // From straight above, the lower edge of the image is the front.
+    front = towards_sensor - towards_sensor.dot(up) * up;
+    if (front.norm() < 1e-3 * towards_sensor.norm())
+      front = R.col(1) - R.col(1).dot(up) * up;
+  }
+  const double radian = kPi / 180.0;
+  return View::orbit(front.normalized(),
+                     up,
+                     radian * aside.azimuth,
+                     radian * aside.elevation);
+}
+
+View
+viewOf(const Subject& subject, const RenderSettings& settings)
+{
+  return subject.seen && !settings.aside ?
+             View::perspective(subject.sensor_pose) :
+             viewFromAside(subject, settings.aside.value_or(Aside()));
+}
+
+/// Equal frames for `count` pictures, row by row.
+std::vector<Frame>
+grid(const Frame& all, int count, int columns)
+{
+  constexpr int kLeast = 64; // px; the title takes a third
+  const int rows = (count + columns - 1) / columns;
+  if (std::min(all.width() / columns, all.height() / rows) < kLeast)
+    throw CLI::ValidationError("--size", "is too small for what the picture shows");
+  std::vector<Frame> frames;
+  for (int i = 0; i < count; ++i) {
+    const int column = i % columns, row = i / columns;
+    frames.push_back({all.left + all.width() * column / columns,
+                      all.top + all.height() * row / rows,
+                      all.left + all.width() * (column + 1) / columns,
+                      all.top + all.height() * (row + 1) / rows});
+  }
+  return frames;
+}
+
+/// Dark or light, whichever stands out.
+Rgb
+textColor(const Rgb& background)
+{
+  const int green_counts_most = 3 * background[0] + 6 * background[1] + background[2];
+  return green_counts_most > 1275 ? Rgb{40, 40, 40} : Rgb{225, 225, 225};
+}
+
+/// Writes lines over the top of the frame. \return what is left of it.
+Frame
+drawTitle(Canvas& canvas,
+          const Frame& frame,
+          const std::vector<std::string>& lines,
+          const Rgb& color)
+{
+  Frame rest = frame;
+  canvas.clip(frame);
+  for (const std::string& line : lines) {
+    drawText(canvas,
+             0.5 * (frame.left + frame.right),
+             rest.top + 15,
+             shortened(line, frame.width() - 8),
+             TextAlign::Centre,
+             color);
+    rest.top += kTitleHeight;
+  }
+  return rest;
+}
+
+void
+drawSubject(Canvas& canvas,
+            const Frame& frame,
+            const Subject& subject,
+            const PatchColors& colors,
+            const RenderSettings& settings)
+{
+  View view = viewOf(subject, settings);
+  view.fit(subject.points.positions, frame, settings.zoom);
+  canvas.clip(frame);
+  drawPoints(canvas, view, frame, subject.points);
+  // Glass shows what lies behind it, which has to be there first.
+  std::vector<std::pair<double, const FitResult*>> from_afar;
+  for (const ExtractedPatch& patch : subject.patches)
+    if (const auto at = view.project(patch.fit.patch.c))
+      from_afar.emplace_back(at->nearness, &patch.fit);
+  std::sort(from_afar.begin(), from_afar.end());
+  for (const auto& [nearness, fit] : from_afar)
+    drawPatch(canvas, view, fit->patch, colors(*fit));
+}
+
+void
+renderResults(Canvas& canvas, const RenderSettings& settings)
+{
+  std::vector<Subject> subjects;
+  std::vector<ExtractedPatch> all_patches;
+  for (const std::string& result : settings.results) {
+    const Subject& subject = subjects.emplace_back(loadSubject(result, settings));
+    all_patches.insert(all_patches.end(),
+                       subject.patches.begin(),
+                       subject.patches.end());
+  }
+  const PatchColors colors(settings.measure, all_patches);
+  const Rgb text = textColor(settings.background);
+  const Frame whole = canvas.frame();
+  const int legend_top =
+      whole.bottom - kMargin - colors.legendHeight(whole.width() - 2 * kMargin);
+  colors.drawLegend(canvas,
+                    {kMargin, legend_top, whole.right - kMargin, whole.bottom},
+                    text);
+  const int count = static_cast<int>(subjects.size());
+  const int columns = static_cast<int>(std::ceil(std::sqrt(count)));
+  const std::vector<Frame> frames =
+      grid({0, kTop, whole.right, legend_top - kMargin}, count, columns);
+  for (std::size_t i = 0; i < subjects.size(); ++i)
+    drawSubject(canvas,
+                drawTitle(canvas, frames[i], {subjects[i].title}, text),
+                subjects[i],
+                colors,
+                settings);
+}
+
+/// "elliptic paraboloid", "ellipse, 10 parameters".
+std::vector<std::string>
+typeTitle(PatchType type)
+{
+  return {spacedName(type.surface),
+          std::string(boundaryName(type.boundary)) + ", " +
+              std::to_string(degreesOfFreedom(type)) + " parameters"};
+}
+
+void
+renderTypes(Canvas& canvas, const RenderSettings& settings)
+{
+  constexpr int kColumns = 5;
+  constexpr double kAzimuth = -0.6, kElevation = 0.6; // rad
+  const Frame whole = canvas.frame();
+  const std::vector<Frame> frames = grid({0, kTop, whole.right, whole.bottom},
+                                         static_cast<int>(kPatchTypes.size()),
+                                         kColumns);
+  for (std::size_t i = 0; i < kPatchTypes.size(); ++i) {
+    const PatchType type = kPatchTypes[i];
+    const Patch patch = tableTwoScene(type).scene.patches.front();
+    const Frame frame =
+        drawTitle(canvas, frames[i], typeTitle(type), textColor(settings.background));
+    View view = View::orbit(-Eigen::Vector3d::UnitY(),
+                            Eigen::Vector3d::UnitZ(),
+                            kAzimuth,
+                            kElevation);
+    view.fit(tessellate(patch, 0.05).vertices, frame, 0.8 * settings.zoom);
+    canvas.clip(frame);
+    drawSolidPatch(canvas, view, patch, surfaceColor(type.surface));
+  }
+}
+
+void
+runRender(const RenderSettings& settings)
+{
+  checkRenderSettings(settings);
+  AtomicFile file(settings.output);
+  Canvas canvas(settings.width, settings.height, settings.background);
+  if (settings.types)
+    renderTypes(canvas, settings);
+  else
+    renderResults(canvas, settings);
+  canvas.writePng(file.stream());
+  file.commit();
+}
+
+} // namespace
+
+void
+addRenderCommand(CLI::App& app, int& exit_code)
+{
+  CLI::App* command =
+      app.add_subcommand("render", "Draw patches on their cloud as a picture");
+  command->footer(kExamples);
+  const auto settings = std::make_shared<RenderSettings>();
+  addRenderOptions(*command, *settings);
+  command->callback([settings, &exit_code] {
+    runRender(*settings);
+    exit_code = 0;
+  });
+}
+
+} // namespace holdfast::app

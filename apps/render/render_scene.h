@@ -1,0 +1,34 @@
+/// \file What a picture shows: clouds and patches.
+#pragma once
+
+#include "view.h"
+
+#include <holdfast/patch/patch.h>
+
+namespace holdfast::app {
+
+/// The finite points of a cloud, to be drawn.
+struct PicturePoints {
+  std::vector<Eigen::Vector3d> positions; ///< world frame, m
+  std::vector<Rgb> colors; ///< one each, or empty: grey, shaded by their surface
+};
+
+/// Draws points as discs just large enough to touch their neighbours.
+void drawPoints(Canvas& canvas,
+                const View& view,
+                const Frame& frame,
+                const PicturePoints& points);
+
+/// Draws a patch as tinted glass with an outline. It stands off its surface by a
+/// fraction of its size, so that the noise of the points it is fitted to does not cover
+/// it but other things do.
+void drawPatch(Canvas& canvas, const View& view, const Patch& patch, const Rgb& color);
+
+/// Draws a patch as a solid sheet with lines of constant x and y, and its axes: x red,
+/// y green, z blue.
+void drawSolidPatch(Canvas& canvas,
+                    const View& view,
+                    const Patch& patch,
+                    const Rgb& color);
+
+} // namespace holdfast::app

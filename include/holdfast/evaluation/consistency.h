@@ -1,0 +1,61 @@
+/// \file Are the covariances right? Monte Carlo over noise drawn on a known scene.
+#pragma once
+
+#include <holdfast/patch_estimator.h>
+#include <holdfast/progress.h>
+#include <holdfast/simulation/simulator.h>
+
+#include <cstdint>
+#include <vector>
+
+namespace holdfast {
+
+struct ConsistencyOptions {
+  FitOptions fit; ///< surface and boundary are set to the type of the scene's patch
+  CovarianceMode mode = CovarianceMode::Exact;
+  int trials = 3000;
+  std::uint64_t seed = 1;
+  int threads = 0; ///< 0: all cores; the result does not depend on it
+  double noise_scale = 1.0; ///< factor on the sigmas of the noise drawn and assumed
+  /// Refit every trial with SurfaceRequest::Auto to count type errors.
+  bool count_type_errors = false;
+  Progress progress;
+};
+
+/// How predicted covariances compare with what happened. All errors are in the tangent
+/// space [d | k | delta | c] about the fit to noise-free points: the patch that the
+/// same pixels give without noise, not the patch the scene was made of.
+struct ConsistencyResult {
+  int trials = 0;
+  int points = 0;
+  /// Normalised estimation error squared over the rank of the covariance: 1 is right.
+  /// About the noise-free fit; SecondOrder's region lies about the estimate plus its
+  /// mean shift (the estimate minus the shift is unbiased, but seen from the estimate
+  /// what it came from lies the other way, as on a bent line).
+  double nees_per_dof = 0.0;
+  double nees_per_dof_about_mean = 0.0;
+  /// Share of the trials within the 95 % ellipsoid about the noise-free fit.
+  double coverage95 = 0.0;
+  /// By parameter: root mean predicted variance over empirical sigma.
+  std::vector<double> sigma_ratio;
+  /// By parameter: mean error over empirical sigma.
+  std::vector<double> bias_sigma;
+  /// As bias_sigma after subtracting the second-order shift at the noise-free fit.
+  std::vector<double> bias_after_shift_sigma;
+  double type_error_rate = 0.0;
+  /// Trials whose axes came out turned by more than 45 degrees; left out above.
+  double switch_rate = 0.0;
+  /// Trials without a usable fit; left out above.
+  double failure_rate = 0.0;
+};
+
+/// \param scene its first patch is fitted; points on anything else are not used.
+/// \param noise the model that noise is drawn from and covariances are taken from.
+/// \throw std::invalid_argument when options make no sense, the scene has no patch, or
+///        the noise-free points do not determine it.
+ConsistencyResult checkConsistency(const Scene& scene,
+                                   const RayGrid& rays,
+                                   const NoiseModel& noise,
+                                   const ConsistencyOptions& options);
+
+} // namespace holdfast

@@ -1,0 +1,316 @@
+#include "parallel/parallel_for.h"
+
+#include <holdfast/evaluation/consistency.h>
+#include <holdfast/fit/reference_points.h>
+#include <holdfast/geometry/gaussian.h>
+#include <holdfast/geometry/rotation.h>
+#include <holdfast/uncertainty/monte_carlo.h>
+
+#include <boost/math/distributions/chi_squared.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace holdfast {
+namespace {
+
+// The points of a scene's patch, in the camera frame and without noise.
+struct TruePoints {
+  Pose sensor_pose;
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Eigen::Matrix3d> roots;
+};
+
+TruePoints
+truePoints(const Scene& scene,
+           const RayGrid& rays,
+           const NoiseModel& noise,
+           double noise_scale)
+{
+  RangeImage image = castRays(scene, rays);
+  attachNoise(image, noise, noise_scale);
+  TruePoints truth;
+  truth.sensor_pose = image.sensor_pose;
+  const Eigen::Matrix3d to_camera = image.sensor_pose.R.transpose();
+  for (std::size_t i = 0; i < image.truth.size(); ++i)
+    if (image.hits[i] == 0) {
+      truth.points.push_back(image.sensor_pose.toLocal(image.truth[i]));
+      truth.roots.push_back(to_camera * image.roots[i]);
+    }
+  return truth;
+}
+
+// Fills the batch in the world frame from measured points in the camera frame, with
+// covariances from the model, at the surface if asked.
+void
+fillBatch(const std::vector<Eigen::Vector3d>& points,
+          const TruePoints& truth,
+          const NoiseModel& noise,
+          double noise_scale,
+          bool noise_at_surface,
+          PointBatch& camera,
+          PointBatch& batch)
+{
+  camera.clear(Eigen::Vector3d::Zero());
+  for (const Eigen::Vector3d& q : points)
+    camera.add(q, Eigen::Matrix3d::Zero());
+  if (noise_at_surface)
+    computeReferencePoints(camera, Eigen::Vector3d::Zero());
+  const auto first = noise_at_surface ? PointBatch::RX : PointBatch::X;
+  const Eigen::Matrix3d& R = truth.sensor_pose.R;
+  batch.clear(truth.sensor_pose.toWorld(truth.points.front()));
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    Eigen::Vector3d at;
+    for (int k = 0; k < 3; ++k)
+      at[k] = camera.channel(static_cast<PointBatch::Channel>(first + k))[i];
+    batch.add(truth.sensor_pose.toWorld(points[i]),
+              noise_scale * noise_scale * rotateCovariance(R, noise.covariance(at)));
+  }
+}
+
+// Error of a patch in the tangent space [d | k | delta | c] of the reference.
+ParameterVector
+tangentError(const Patch& patch, const Patch& reference)
+{
+  const ParameterLayout layout = layoutOf(reference.type);
+  ParameterVector error = pack(patch) - pack(reference);
+  const Eigen::Vector3d delta =
+      logMap(expMap(reference.r).transpose() * expMap(patch.r));
+  error.segment(layout.r(), layout.r_count) = delta.head(layout.r_count);
+  return error;
+}
+
+// [d | k | r | c] shift to the tangent space.
+ParameterVector
+tangentShift(const Patch& patch, const ParameterVector& shift)
+{
+  return tangentJacobian(patch) * shift;
+}
+
+struct Trial {
+  enum class Outcome { Used, Switched, Failed };
+  Outcome outcome = Outcome::Failed;
+  bool wrong_type = false;
+  // Tangent space. The region of confidence about the estimate plus the second-order
+  // shift, where there is one, lies off the reference by error + shift.
+  ParameterVector error, shift;
+  ParameterMatrix covariance;
+};
+
+// x^T S^+ x and the rank of S.
+struct Mahalanobis {
+  double squared = 0.0;
+  int rank = 0;
+};
+
+Mahalanobis
+mahalanobis(const ParameterVector& x, const ParameterMatrix& S)
+{
+  // Parameters differ in unit: scale to correlations, so that one tolerance decides.
+  constexpr double kNull = 1e-9;
+  const ParameterVector inverse = S.diagonal().cwiseSqrt().cwiseInverse();
+  const ParameterMatrix correlation = inverse.asDiagonal() * S * inverse.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<ParameterMatrix> solver(correlation);
+  const ParameterVector y = solver.eigenvectors().transpose() * inverse.cwiseProduct(x);
+  Mahalanobis result;
+  for (int i = 0; i < y.size(); ++i)
+    if (solver.eigenvalues()[i] > kNull) {
+      result.squared += y[i] * y[i] / solver.eigenvalues()[i];
+      ++result.rank;
+    }
+  return result;
+}
+
+class TrialRunner {
+public:
+  TrialRunner(const TruePoints& truth,
+              const NoiseModel& noise,
+              const FitOptions& fit,
+              PatchType type,
+              const ConsistencyOptions& options)
+  : truth_(truth)
+  , noise_(noise)
+  , options_(options)
+  , estimator_(fit, options.mode)
+  , free_estimator_(freeOptions(fit), CovarianceMode::GaussNewton)
+  , type_(type)
+  {}
+
+  // The fit to the points without noise: their scatter has none to subtract.
+  FitResult noiseFree(CovarianceMode mode, const FitOptions& fit) const
+  {
+    PointBatch camera, batch;
+    fill(truth_.points, camera, batch);
+    FitOptions options = fit;
+    options.debias_scatter = false;
+    return PatchEstimator(options, mode).estimate(batch);
+  }
+
+  Trial run(int index, const Patch& reference) const
+  {
+    // A turn of more than this is a change of representation, not an error.
+    constexpr double kSwitched = 0.785;
+    std::mt19937_64 generator =
+        trialGenerator(options_.seed, static_cast<std::uint64_t>(index));
+    PointBatch camera, batch;
+    std::vector<Eigen::Vector3d> points;
+    drawNoise(truth_.points, truth_.roots, generator, points);
+    fill(points, camera, batch);
+    const FitResult fit = estimator_.estimate(batch);
+    Trial trial;
+    if (options_.count_type_errors)
+      trial.wrong_type =
+          free_estimator_.estimate(batch).patch.type.surface != type_.surface;
+    if (!isUsable(fit.status))
+      return trial;
+    trial.error = tangentError(fit.patch, reference);
+    trial.shift = fit.mean_shift.size() > 0 ? tangentShift(fit.patch, fit.mean_shift) :
+                                              ParameterVector::Zero(trial.error.size());
+    trial.covariance = toTangent(fit.patch, fit.covariance);
+    const ParameterLayout layout = layoutOf(type_);
+    const double turn = layout.r_count == 3 ? trial.error[layout.r() + 2] : 0.0;
+    trial.outcome =
+        std::abs(turn) > kSwitched ? Trial::Outcome::Switched : Trial::Outcome::Used;
+    return trial;
+  }
+
+private:
+  static FitOptions freeOptions(FitOptions fit)
+  {
+    fit.surface = SurfaceRequest::Auto;
+    return fit;
+  }
+
+  void fill(const std::vector<Eigen::Vector3d>& points,
+            PointBatch& camera,
+            PointBatch& batch) const
+  {
+    fillBatch(points,
+              truth_,
+              noise_,
+              options_.noise_scale,
+              options_.fit.noise_at_surface,
+              camera,
+              batch);
+  }
+
+  const TruePoints& truth_;
+  const NoiseModel& noise_;
+  const ConsistencyOptions& options_;
+  PatchEstimator estimator_;
+  PatchEstimator free_estimator_;
+  PatchType type_;
+};
+
+std::vector<Trial>
+runTrials(const TrialRunner& runner,
+          const Patch& reference,
+          const ConsistencyOptions& options)
+{
+  std::vector<Trial> trials(static_cast<std::size_t>(options.trials));
+  parallelFor(
+      options.trials,
+      options.threads,
+      [&](int i, int) {
+        trials[static_cast<std::size_t>(i)] = runner.run(i, reference);
+      },
+      options.progress);
+  return trials;
+}
+
+std::vector<double>
+toStd(const ParameterVector& v)
+{
+  return {v.data(), v.data() + v.size()};
+}
+
+void
+summarize(const std::vector<Trial>& trials, ConsistencyResult& result)
+{
+  int used = 0;
+  ParameterVector mean, predicted;
+  for (const Trial& trial : trials) {
+    result.type_error_rate += trial.wrong_type;
+    result.switch_rate += trial.outcome == Trial::Outcome::Switched;
+    result.failure_rate += trial.outcome == Trial::Outcome::Failed;
+    if (trial.outcome != Trial::Outcome::Used)
+      continue;
+    if (used++ == 0) {
+      mean = ParameterVector::Zero(trial.error.size());
+      predicted = mean;
+    }
+    mean += trial.error;
+    predicted += trial.covariance.diagonal();
+  }
+  result.trials = static_cast<int>(trials.size());
+  const double inverse_trials = 1.0 / result.trials;
+  result.type_error_rate *= inverse_trials;
+  result.switch_rate *= inverse_trials;
+  result.failure_rate *= inverse_trials;
+  if (used < 2)
+    return;
+  mean /= used;
+  predicted /= used;
+  ParameterVector variance = ParameterVector::Zero(mean.size());
+  for (const Trial& trial : trials) {
+    if (trial.outcome != Trial::Outcome::Used)
+      continue;
+    variance += (trial.error - mean).cwiseAbs2();
+    const Mahalanobis about_fit =
+        mahalanobis(trial.error + trial.shift, trial.covariance);
+    const Mahalanobis about_mean = mahalanobis(trial.error - mean, trial.covariance);
+    result.nees_per_dof += about_fit.squared / about_fit.rank / used;
+    result.nees_per_dof_about_mean += about_mean.squared / about_mean.rank / used;
+    const boost::math::chi_squared chi2(about_fit.rank);
+    const bool within = about_fit.squared <= boost::math::quantile(chi2, 0.95);
+    result.coverage95 += static_cast<double>(within) / used;
+  }
+  variance /= used - 1;
+  const ParameterVector sigma = variance.cwiseSqrt();
+  result.sigma_ratio = toStd(predicted.cwiseSqrt().cwiseQuotient(sigma));
+  result.bias_sigma = toStd(mean.cwiseQuotient(sigma));
+  result.bias_after_shift_sigma = result.bias_sigma;
+}
+
+} // namespace
+
+ConsistencyResult
+checkConsistency(const Scene& scene,
+                 const RayGrid& rays,
+                 const NoiseModel& noise,
+                 const ConsistencyOptions& options)
+{
+  if (scene.patches.empty())
+    throw std::invalid_argument("the scene has no patch to fit");
+  if (options.trials < 2)
+    throw std::invalid_argument("a consistency check needs at least two trials");
+  if (!(options.noise_scale > 0.0))
+    throw std::invalid_argument("noise_scale must be positive");
+  const PatchType type = scene.patches[0].type;
+  const TruePoints truth = truePoints(scene, rays, noise, options.noise_scale);
+  if (truth.points.empty())
+    throw std::invalid_argument("the sensor does not see the patch");
+  FitOptions fit = withType(options.fit, type);
+  fit.viewpoint = truth.sensor_pose.c;
+
+  const TrialRunner runner(truth, noise, fit, type, options);
+  const FitResult reference = runner.noiseFree(CovarianceMode::SecondOrder, fit);
+  if (!isUsable(reference.status))
+    throw std::invalid_argument("the noise-free points do not determine the patch: " +
+                                std::string(statusName(reference.status)));
+  ConsistencyResult result;
+  result.points = reference.points;
+  const std::vector<Trial> trials = runTrials(runner, reference.patch, options);
+  summarize(trials, result);
+  const ParameterVector shift = tangentShift(reference.patch, reference.mean_shift);
+  for (std::size_t i = 0; i < result.bias_sigma.size(); ++i) {
+    const double predicted = std::sqrt(toTangent(reference.patch, reference.covariance)
+                                           .diagonal()[static_cast<Eigen::Index>(i)]);
+    const double sigma = predicted / result.sigma_ratio[i];
+    result.bias_after_shift_sigma[i] -= shift[static_cast<Eigen::Index>(i)] / sigma;
+  }
+  return result;
+}
+
+} // namespace holdfast

@@ -1,0 +1,60 @@
+/// \file From an unbounded surface to a bounded patch: paper stages II-4 to II-9.
+///
+/// The bounds are functions of the projected points' moments, so the whole patch is a
+/// function of theta (the surface), of the nine moments s and, where the normal comes
+/// from a weighted plane, of that plane's theta. boundPatch() gives its value and its
+/// Jacobian.
+#pragma once
+
+#include "surface_fit.h"
+
+namespace holdfast {
+
+/// What a patch is a function of, in the axes of the surface's frame: theta (6), mean
+/// (3), scatter (6), theta of the plane stage (3).
+struct JointLayout {
+  static constexpr int kTheta = 0;
+  static constexpr int kMean = 6;
+  static constexpr int kScatter = 9;
+  static constexpr int kPlane = 15;
+  static constexpr int kSize = 18;
+};
+
+/// d[d | k | r | c] / d joint; as many rows as the patch has parameters.
+using PatchJacobian = Eigen::Matrix<double,
+                                    Eigen::Dynamic,
+                                    JointLayout::kSize,
+                                    Eigen::RowMajor | Eigen::DontAlign,
+                                    kMaxParameters,
+                                    JointLayout::kSize>;
+
+/// lambda = sqrt(2) erfinv(Gamma) of stage II-4, and sqrt(-ln(1 - Gamma)) of II-9.
+struct ContainmentFactors {
+  double lambda = 0.0;
+  double plane = 0.0;
+
+  /// \param containment Gamma in (0, 1).
+  static ContainmentFactors of(double containment);
+};
+
+struct BoundedPatch {
+  /// Converged, Degenerate (no extent, or no direction for z), OrientationSingular,
+  /// CurvatureSignMismatch.
+  FitStatus status = FitStatus::Converged;
+  Patch patch;
+  PatchJacobian jacobian;
+};
+
+/// Bounds a fitted surface as a patch of the given type and brings it into canonical
+/// form. \param origin of the batch, world frame. \param plane the weighted plane that
+/// gives sphere and cylinder their normal; null: the
+///        normal of the scatter.
+BoundedPatch boundPatch(PatchType type,
+                        const UnboundedSurface& surface,
+                        const Scatter& scatter,
+                        const UnboundedSurface* plane,
+                        const Eigen::Vector3d& origin,
+                        const ContainmentFactors& factors,
+                        bool smooth_circle_radius);
+
+} // namespace holdfast

@@ -1,0 +1,63 @@
+/// \file The fit of one bounded patch, paper sections II and III, stage by stage.
+#pragma once
+
+#include "boundary_fit.h"
+#include "discrimination.h"
+#include "surface_fit.h"
+#include <holdfast/fit/options.h>
+#include <holdfast/fit/point_batch.h>
+
+namespace holdfast {
+
+/// A fitted patch with everything its covariance is computed from.
+struct PatchFit {
+  FitStatus status = FitStatus::TooFewPoints;
+  Scatter scatter;
+  SurfaceFit surface;
+  /// Stage I-1 as a weighted plane, when sphere or cylinder take their normal from it.
+  bool has_plane_stage = false;
+  SurfaceFit plane;
+  BoundedPatch bounded;
+  NullSpace null_space = NullSpace(6, 0);
+  int points = 0;
+  int invalid_points = 0;
+
+  const UnboundedSurface* normalPlane() const
+  {
+    return has_plane_stage ? &plane.surface : nullptr;
+  }
+};
+
+/// Fits patches under one set of options; checks them and works out what depends on
+/// them once. Const and free of state: one fitter serves any number of threads.
+class PatchFitter {
+public:
+  /// \throw std::invalid_argument when the options make no sense (validityError).
+  explicit PatchFitter(const FitOptions& options);
+
+  /// The stages in order. Bad data come back as a status, never as an exception.
+  /// \param batch is cleaned of invalid points and padded.
+  PatchFit fit(PointBatch& batch) const;
+
+  /// Stages II-4 to II-9 again, for a surface near the fitted one (what a second-order
+  /// propagation differentiates).
+  BoundedPatch bound(PatchType type,
+                     const UnboundedSurface& surface,
+                     const Scatter& scatter,
+                     const UnboundedSurface* plane,
+                     const Eigen::Vector3d& origin) const;
+
+  const FitOptions& options() const
+  {
+    return options_;
+  }
+
+private:
+  PatchType patchType(const PatchFit& fit) const;
+
+  FitOptions options_;
+  ContainmentFactors factors_;
+  DiscriminationThresholds thresholds_;
+};
+
+} // namespace holdfast

@@ -1,0 +1,119 @@
+/// \file Unbounded surfaces: paper stages I-1 and I-2.
+#pragma once
+
+#include "kernel.h"
+#include <holdfast/fit/point_batch.h>
+#include <holdfast/fit/result.h>
+
+#include <Eigen/Core>
+
+namespace holdfast {
+
+/// Solver parameters theta in the order of kernel::Model, padded with zeros to six:
+/// every surface then shares one fixed size. Unaligned, so that the layout is the same
+/// for any instruction set.
+using Theta = Eigen::Matrix<double, kernel::kMaxTheta, 1, Eigen::DontAlign>;
+using ThetaMatrix =
+    Eigen::Matrix<double, kernel::kMaxTheta, kernel::kMaxTheta, Eigen::DontAlign>;
+
+/// The moments s of the points: mean (3), then scatter xx xy xz yy yz zz (6).
+inline constexpr int kMoments = 9;
+using ThetaByMoments =
+    Eigen::Matrix<double, kernel::kMaxTheta, kMoments, Eigen::DontAlign>;
+using MomentMatrix = Eigen::Matrix<double, kMoments, kMoments, Eigen::DontAlign>;
+
+/// Mean and scatter of the points, relative to the batch's origin.
+struct Scatter {
+  int count = 0;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  /// Scatter about the mean over N, less the mean point covariance when debiased.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  /// Principal axes, eigenvalues ascending; z is the normal, towards the viewpoint.
+  Eigen::Vector3d eigenvalues = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
+
+  Eigen::Vector3d normal() const
+  {
+    return axes.col(2);
+  }
+};
+
+/// How the estimate moves with the points, to first order, in the axes of the fit's
+/// frame: with X_i = d^2E/dtheta dq_i, A = d^2E/dtheta ds and D_i = ds/dq_i,
+///
+///     dtheta/dq_i = -H^-1 (X_i + A D_i).
+struct Linearization {
+  ThetaMatrix H = ThetaMatrix::Identity(); ///< Hessian; identity on padding
+  ThetaByMoments A = ThetaByMoments::Zero();
+  ThetaMatrix XX = ThetaMatrix::Zero(); ///< sum X_i Sigma_i X_i^T
+  ThetaByMoments XD = ThetaByMoments::Zero(); ///< sum X_i Sigma_i D_i^T
+  MomentMatrix DD = MomentMatrix::Zero(); ///< sum D_i Sigma_i D_i^T
+};
+
+/// An unbounded surface in the solver's terms.
+struct UnboundedSurface {
+  kernel::Model model = kernel::Model::Paraboloid;
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity(); ///< local to world
+  Eigen::Vector3d c = Eigen::Vector3d::Zero(); ///< relative to the batch's origin
+  Eigen::Vector3d k = Eigen::Vector3d::Zero(); ///< kxx kxy kyy, or k 0 0
+  double a = 0.0; ///< paraboloid: c = mean + a normal
+};
+
+/// A fitted surface and what its covariance needs.
+struct SurfaceFit {
+  FitStatus status = FitStatus::TooFewPoints;
+  UnboundedSurface surface;
+  double cost = 0.0; ///< half of chi-square
+  int iterations = 0;
+  int polish_steps = 0;
+  ThetaMatrix JtJ = ThetaMatrix::Identity(); ///< Gauss-Newton part of the Hessian
+  Linearization linearization;
+};
+
+/// Moments and principal axes of a padded batch.
+/// \param viewpoint relative to the batch's origin.
+Scatter measureScatter(const PointBatch& batch,
+                       bool debias,
+                       const Eigen::Vector3d& viewpoint);
+
+/// The scatter with other moments; its axes follow, the normal on the same side.
+Scatter withMoments(const Scatter& scatter,
+                    const Eigen::Vector3d& mean,
+                    const Eigen::Matrix3d& covariance);
+
+/// The surface moved by a step of theta.
+UnboundedSurface retractedSurface(const UnboundedSurface& surface,
+                                  const Scatter& scatter,
+                                  const Theta& step);
+
+/// P of dn = P dC n, the first-order change of the eigenvector n of the smallest
+/// eigenvalue of C (any axes; n unit): P = B (l0 I - B^T C B)^-1 B^T, B normal to n.
+Eigen::Matrix3d normalDerivative(const Eigen::Matrix3d& C, const Eigen::Vector3d& n);
+
+/// dn/d(xx xy xz yy yz zz), 3x6.
+Eigen::Matrix<double, 3, 6> normalJacobian(const Eigen::Matrix3d& C,
+                                           const Eigen::Vector3d& n);
+
+/// Weighted fit of one surface: closed-form start, Levenberg-Marquardt, exact Newton
+/// steps at the end, and the linearization there.
+/// \param null_space receives the undetermined directions of theta when Degenerate.
+SurfaceFit fitSurface(kernel::Model model,
+                      const PointBatch& batch,
+                      const Scatter& scatter,
+                      const FitOptions& options,
+                      NullSpace& null_space);
+
+/// Inverse of a positive definite matrix.
+ThetaMatrix symmetricInverse(const ThetaMatrix& H);
+
+/// First-order covariance of theta, from the Hessian or its Gauss-Newton part.
+ThetaMatrix thetaCovariance(const Linearization& linearization,
+                            const ThetaMatrix& hessian);
+
+/// The batch as the kernel sees it.
+kernel::Points kernelPoints(const PointBatch& batch);
+
+/// The surface as the kernel sees it.
+kernel::State kernelState(const UnboundedSurface& surface, const Scatter& scatter);
+
+} // namespace holdfast

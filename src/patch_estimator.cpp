@@ -1,0 +1,49 @@
+#include <holdfast/patch_estimator.h>
+
+#include "fit/fit_patch.h"
+#include "uncertainty/covariance.h"
+
+namespace holdfast {
+
+struct PatchEstimator::Impl {
+  PatchFitter fitter;
+  CovarianceMode mode;
+};
+
+PatchEstimator::PatchEstimator(const FitOptions& options, CovarianceMode mode)
+: impl_(std::make_shared<const Impl>(Impl{PatchFitter(options), mode}))
+{}
+
+FitResult
+PatchEstimator::estimate(PointBatch& batch) const
+{
+  const PatchFit fit = impl_->fitter.fit(batch);
+  FitResult result;
+  result.status = fit.status;
+  result.patch = fit.bounded.patch;
+  result.chi2 = 2.0 * fit.surface.cost;
+  result.chi2_dof = fit.points - kernel::parameterCount(fit.surface.surface.model);
+  result.points = fit.points;
+  result.invalid_points = fit.invalid_points;
+  result.iterations = fit.surface.iterations;
+  result.polish_steps = fit.surface.polish_steps;
+  result.null_space = fit.null_space;
+  if (fit.status == FitStatus::Converged) {
+    const PatchCovariance uncertainty =
+        patchCovariance(fit, batch, impl_->fitter, impl_->mode);
+    result.covariance = uncertainty.covariance;
+    result.mean_shift = uncertainty.mean_shift;
+    result.status = observability(result.patch, result.covariance);
+    if (!isUsable(result.status))
+      result.covariance.resize(0, 0);
+  }
+  return result;
+}
+
+FitResult
+estimatePatch(PointBatch& batch, const FitOptions& options, CovarianceMode mode)
+{
+  return PatchEstimator(options, mode).estimate(batch);
+}
+
+} // namespace holdfast

@@ -1,0 +1,117 @@
+#include <holdfast/simulation/reference_scenes.h>
+
+#include "sensor/require.h"
+
+#include <cmath>
+#include <initializer_list>
+#include <stdexcept>
+
+namespace holdfast {
+
+namespace {
+
+constexpr double kPi = 3.141592653589793;
+
+/// Boundary and curvature parameters of one patch.
+struct Intrinsics {
+  PatchType type;
+  std::initializer_list<double> d;
+  std::initializer_list<double> k;
+};
+
+/// The patch of that type in a list of all ten, at the origin, axes as the world's.
+Patch
+patchFrom(std::initializer_list<Intrinsics> patches, PatchType type)
+{
+  for (const Intrinsics& candidate : patches) {
+    if (candidate.type != type)
+      continue;
+    Patch patch;
+    patch.type = type;
+    std::copy(candidate.d.begin(), candidate.d.end(), patch.d.begin());
+    std::copy(candidate.k.begin(), candidate.k.end(), patch.kappa.begin());
+    return patch;
+  }
+  throw std::invalid_argument("no legal patch type");
+}
+
+/// Paper, Table II.
+Patch
+tableTwoPatch(PatchType type)
+{
+  using S = SurfaceType;
+  using B = BoundaryType;
+  return patchFrom({{{S::EllipticParaboloid, B::Ellipse}, {1.5, 1.0}, {-1.0, -2.0}},
+                    {{S::HyperbolicParaboloid, B::Ellipse}, {1.5, 1.0}, {0.5, -1.0}},
+                    {{S::CylindricParaboloid, B::Rectangle}, {2.0, 0.8}, {-2.0}},
+                    {{S::CircularParaboloid, B::Circle}, {1.8}, {-1.0}},
+                    {{S::Plane, B::Ellipse}, {1.5, 1.0}, {}},
+                    {{S::Plane, B::Circle}, {2.0}, {}},
+                    {{S::Plane, B::Rectangle}, {1.7, 2.5}, {}},
+                    {{S::Plane, B::Quad}, {2.3, 2.0, 1.7, 2.3, kPi / 4.0}, {}},
+                    {{S::Sphere, B::Circle}, {1.8}, {-0.5}},
+                    {{S::CircularCylinder, B::Rectangle}, {2.0, 1.8}, {-0.5}}},
+                   type);
+}
+
+Patch
+robotPatch(PatchType type)
+{
+  using S = SurfaceType;
+  using B = BoundaryType;
+  return patchFrom({{{S::EllipticParaboloid, B::Ellipse}, {0.12, 0.08}, {-5.0, -10.0}},
+                    {{S::HyperbolicParaboloid, B::Ellipse}, {0.12, 0.08}, {5.0, -10.0}},
+                    {{S::CylindricParaboloid, B::Rectangle}, {0.12, 0.08}, {-10.0}},
+                    {{S::CircularParaboloid, B::Circle}, {0.1}, {-8.0}},
+                    {{S::Plane, B::Ellipse}, {0.12, 0.08}, {}},
+                    {{S::Plane, B::Circle}, {0.1}, {}},
+                    {{S::Plane, B::Rectangle}, {0.12, 0.08}, {}},
+                    {{S::Plane, B::Quad}, {0.12, 0.1, 0.11, 0.12, kPi / 6.0}, {}},
+                    {{S::Sphere, B::Circle}, {0.1}, {-6.0}},
+                    {{S::CircularCylinder, B::Rectangle}, {0.12, 0.09}, {-6.0}}},
+                   type);
+}
+
+ReferenceScene
+sceneOf(const std::string& name,
+        const Patch& patch,
+        const Eigen::Vector3d& sensor_position,
+        const RayGrid& rays)
+{
+  ReferenceScene result;
+  result.scene.name = name;
+  result.scene.patches = {patch};
+  result.scene.sensor_pose = lookAt(sensor_position, patch.c, Eigen::Vector3d::UnitY());
+  result.rays = rays;
+  return result;
+}
+
+} // namespace
+
+ReferenceScene
+tableTwoScene(PatchType type)
+{
+  return sceneOf("table_two",
+                 tableTwoPatch(type),
+                 {-1.0, -1.0, 6.0},
+                 frustumRays(30, kPi / 3.0));
+}
+
+ReferenceScene
+robotScene(PatchType type, double distance, double tilt, double azimuth)
+{
+  requirePositive("distance", distance);
+  if (!(tilt >= 0.0 && tilt < kPi / 2.0))
+    throw std::invalid_argument("tilt must lie in [0, pi/2)");
+  Camera kinect;
+  kinect.fx = kinect.fy = 580.0;
+  const Eigen::Vector3d line_of_sight(std::sin(tilt) * std::cos(azimuth),
+                                      std::sin(tilt) * std::sin(azimuth),
+                                      std::cos(tilt));
+  return sceneOf("robot",
+                 robotPatch(type),
+                 distance * line_of_sight,
+                 pixelRays(kinect, 6));
+}
+
+} // namespace holdfast

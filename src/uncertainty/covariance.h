@@ -1,0 +1,35 @@
+/// \file From a fit to the covariance of its parameters.
+#pragma once
+
+#include "fit/fit_patch.h"
+
+#include <holdfast/uncertainty/covariance_mode.h>
+
+namespace holdfast {
+
+/// Covariance of a fitted patch's parameters [d | k | r | c].
+struct PatchCovariance {
+  ParameterMatrix covariance; ///< 0 x 0 when there is none
+  ParameterVector mean_shift; ///< SecondOrder only, else empty
+};
+
+/// The estimate is a function of the points, so to first order
+/// Sigma = sum_i G_i Sigma_i G_i^T with G_i = d(estimate)/dq_i through every stage:
+/// scatter and its normal, the weighted fit, the frame and the bounds. It holds for the
+/// noise of the points alone (not for a surface that is not of the fitted type),
+/// independent between points, given the points that were sampled, and in the frame of
+/// the points. It is singular where the parameters are bound to each other: the quad's
+/// four radii are equal, so its rank is 8.
+///
+/// \param batch the points as PatchFitter::fit() left them.
+/// \return empty unless fit.status is FitStatus::Converged.
+PatchCovariance patchCovariance(const PatchFit& fit,
+                                const PointBatch& batch,
+                                const PatchFitter& fitter,
+                                CovarianceMode mode);
+
+/// What the covariance says of the fit: Converged, or which direction the data do not
+/// determine.
+FitStatus observability(const Patch& patch, const ParameterMatrix& covariance);
+
+} // namespace holdfast
