@@ -1,5 +1,5 @@
 // Are the covariances right? Monte Carlo on the robot scenes, defaults and exact mode.
-#include "None"
+#include "support/patch_batch.h"
 
 #include <holdfast/evaluation/consistency.h>
 

@@ -1,4 +1,4 @@
-#include "live/viewer.h"
+#include "viewer.h"
 
 #include <holdfast/patch/tessellation.h>
 
