@@ -11,6 +11,8 @@
 #include "support/random_patch.h"
 
 #include "fit/boundary_fit.h"
+#include "fit/fit_patch.h"
+
 #include <holdfast/geometry/rotation.h>
 #include <holdfast/patch/surface.h>
 #include <holdfast/patch_estimator.h>

@@ -3,6 +3,8 @@
 #include "support/patch_batch.h"
 #include "support/random_patch.h"
 
+#include "fit/kernel.h"
+
 #include <holdfast/geometry/gaussian.h>
 #include <holdfast/patch_estimator.h>
 
