@@ -45,7 +45,7 @@ writePatchFiles(const PatchReport& report,
   AtomicFile mesh(base.string() + ".patches.ply");
   writeJson(json.stream(), report, JsonLayout::PatchPerLine);
   writePatchPoints(points.stream(), report.result.patches, report.sensor_pose);
-  writeMesh(mesh.stream(), report.result.patches, false);
+  writeMesh(mesh.stream(), report.result.patches, false, report.offset);
   points.commit();
   mesh.commit();
   json.commit();

@@ -76,11 +76,11 @@ run(const std::string& path)
   estimation.compute(patches);
 
   // Behind every point stands the fit in double precision.
-  const auto found = holdfast::sortOut(estimation.getResults());
-  std::cout << found.patches.size() << " patches at " << patches.size() << " seeds\n";
-  for (std::size_t i = 0; i < found.patches.size(); i += 50)
-    printPatch(found.patches[i].fit);
-  return found.patches.empty() ? 1 : 0;
+  const auto found = holdfast::acceptedAmong(estimation.getResults());
+  std::cout << found.size() << " patches at " << patches.size() << " seeds\n";
+  for (std::size_t i = 0; i < found.size(); i += 50)
+    printPatch(found[i].fit);
+  return found.empty() ? 1 : 0;
 }
 
 } // namespace

@@ -3,6 +3,7 @@
 #include "support/patch_batch.h"
 #include "support/random_patch.h"
 
+#include "fit/fit_patch.h"
 #include "fit/kernel.h"
 
 #include <holdfast/geometry/gaussian.h>

@@ -171,6 +171,18 @@ TEST(ChooseSensorPose, IgnoresARotationForDisplay)
   }
 }
 
+TEST(ChooseSensorPose, NeverSetsAPositionAside)
+{
+  Random random;
+  const RangeCloud cloud = makeOrganizedCloud(unevenCamera(), bumpyDepth);
+  for (int i = 0; i < 20; ++i) {
+    const Pose pose{random.rotation(), random.uniformVector(-2.0, 2.0)};
+    std::string notice;
+    EXPECT_EQ(chooseSensorPose(cloud.points, pose, &notice).c, pose.c);
+    EXPECT_TRUE(notice.empty());
+  }
+}
+
 TEST(ChooseSensorPose, KeepsThePoseOfTheFileWhereNothingFits)
 {
   auto points = pcl::make_shared<pcl::PointCloud<pcl::PointXYZ>>();

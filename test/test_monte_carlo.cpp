@@ -4,6 +4,8 @@
 #include "support/random_patch.h"
 
 #include "fit/fit_patch.h"
+#include "parallel/parallel_for.h"
+
 #include <holdfast/evaluation/metrics.h>
 #include <holdfast/geometry/rotation.h>
 #include <holdfast/patch/boundary.h>

@@ -75,7 +75,7 @@ void
 expectSameBits(const ExtractionResult& a, const ExtractionResult& b)
 {
   EXPECT_EQ(a.rejected, b.rejected);
-  EXPECT_EQ(a.invalid_covariances, b.invalid_covariances);
+  EXPECT_EQ(a.points.used, b.points.used);
   EXPECT_EQ(a.notices, b.notices);
   ASSERT_EQ(a.patches.size(), b.patches.size());
   for (std::size_t i = 0; i < a.patches.size(); ++i) {
@@ -295,7 +295,7 @@ TEST(ExtractPatches, TakesTheCovariancesOfTheCloud)
   const ExtractionResult a = extractPatches(cloud, sensor, options);
   const ExtractionResult b = extractPatches(with, other, options);
   ASSERT_EQ(a.patches.size(), b.patches.size());
-  EXPECT_EQ(b.invalid_covariances, 0);
+  EXPECT_EQ(b.points.invalid_covariance, 0);
   // Covariances in single precision: 6e-8 each, and an ill-conditioned fit.
   for (std::size_t i = 0; i < a.patches.size(); ++i)
     expectSimilar(a.patches[i].fit, b.patches[i].fit, 1e-3);
@@ -312,10 +312,10 @@ TEST(ExtractPatches, LeavesOutPointsWithoutACovariance)
   bad.covariances[5000].setConstant(test::kNaN);
   bad.covariances[9000](0, 1) = 10.0F; // not symmetric, not definite
   const ExtractionOptions options = makeOptions();
-  EXPECT_EQ(extractPatches(good, sensor, options).invalid_covariances, 0);
-  EXPECT_EQ(extractPatches(bad, sensor, options).invalid_covariances, 3);
+  EXPECT_EQ(extractPatches(good, sensor, options).points.invalid_covariance, 0);
+  EXPECT_EQ(extractPatches(bad, sensor, options).points.invalid_covariance, 3);
   const ExtractionResult whole = extractWhole(bad, sensor, options);
-  EXPECT_EQ(whole.invalid_covariances, 3);
+  EXPECT_EQ(whole.points.invalid_covariance, 3);
   ASSERT_EQ(whole.patches.size(), 1U);
   EXPECT_EQ(whole.patches[0].fit.points, 160 * 120 - 3);
 }
@@ -411,16 +411,19 @@ TEST(UnknownSensor, ScansFromAllSidesGetConstantNoiseAndANotice)
   const RangeCloud can = makeCan(random);
   const ExtractionOptions options = makeOptions(0.015, 0.02);
   const ExtractionResult result = extractPatches(can, makeSensor(kCamera), options);
-  ASSERT_EQ(result.notices.size(), 1U);
-  EXPECT_EQ(result.notices[0].find('\n'), std::string::npos);
-  EXPECT_EQ(result.invalid_covariances, 0);
+  // Of the noise, of the viewpoint, and of balls.
+  ASSERT_EQ(result.notices.size(), 3U);
+  for (const std::string& notice : result.notices)
+    EXPECT_EQ(notice.find('\n'), std::string::npos);
+  EXPECT_FALSE(result.viewpoint_is_credible);
+  EXPECT_EQ(result.points.used, result.points.in_cloud);
   EXPECT_GT(result.patches.size(), 20U);
 
   Sensor constant = makeSensor(kCamera);
   constant.noise = std::make_shared<const ConstantNoiseModel>(
       ConstantNoiseModel::Parameters{0.001, 0.001});
   ExtractionResult chosen = extractPatches(can, constant, options);
-  EXPECT_TRUE(chosen.notices.empty());
+  EXPECT_EQ(chosen.notices.size(), 2U); // the noise was chosen
   chosen.notices = result.notices;
   expectSameBits(chosen, result);
 }
@@ -437,11 +440,13 @@ TEST(UnknownSensor, FewPointsBehindTheCameraAreLeftOut)
   points->push_back({0.0F, 0.0F, 0.0F});
   const ExtractionResult result =
       extractWhole({points, {}, {}}, makeSensor(kCamera), makeOptions());
-  EXPECT_TRUE(result.notices.empty());
-  EXPECT_EQ(result.invalid_covariances, 2);
+  EXPECT_EQ(
+      result.notices,
+      std::vector<std::string>{"2 of 502 points are left out: 2 behind the camera"});
+  EXPECT_EQ(result.points.behind_camera, 2);
   ASSERT_EQ(result.patches.size(), 1U);
   EXPECT_EQ(result.patches[0].fit.points, 500);
-  EXPECT_EQ(result.patches[0].fit.invalid_points, 2);
+  EXPECT_EQ(result.patches[0].fit.invalid_points, 0);
 }
 
 TEST(Degenerate, CloudsWithTooFewPointsGiveAStatus)

@@ -7,7 +7,7 @@
 #include <holdfast/io/atomic_file.h>
 #include <holdfast/io/patch_io.h>
 #include <holdfast/pcl/intrinsics.h>
-#include <holdfast/pcl/patch_estimation.h>
+#include <holdfast/pcl/patch_extraction.h>
 
 #include <CLI/CLI.hpp>
 
@@ -91,23 +91,6 @@ private:
   std::map<std::string, std::string> written_; ///< cloud by the name of its results
 };
 
-/// \return true when every point had a valid covariance.
-bool
-checkCovariances(const std::string& path, const RangeCloud& cloud)
-{
-  const int invalid = countInvalidCovariances(cloud);
-  if (invalid == 0)
-    return true;
-  const int valid = countValidPoints(cloud);
-  const std::string what = path + ": " + std::to_string(invalid) + " of " +
-                           std::to_string(valid) +
-                           " covariances are not finite or not positive semi-definite";
-  if (invalid == valid)
-    throw std::runtime_error(what);
-  printError(what + "; those points are left out");
-  return false;
-}
-
 void
 checkPatches(const PatchReport& report)
 {
@@ -125,38 +108,6 @@ printNotices(const std::string& path, const std::vector<std::string>& notices)
     printNotice(path + ": " + notice);
 }
 
-/// Notices about the cloud that only the options can give.
-std::vector<std::string>
-neighborhoodNotices(const FitSettings& settings, const RangeCloud& cloud)
-{
-  if (settings.whole || cloud.points->height > 1 ||
-      settings.extraction.options.sampler.neighborhood != Neighborhood::Disc)
-    return {};
-  return {"not organized: balls take the place of discs"};
-}
-
-/// Patches all over the cloud, by the class that PCL pipelines use.
-ExtractionResult
-estimatePatches(const RangeCloud& cloud,
-                const Sensor& sensor,
-                const ExtractionOptions& options)
-{
-  PatchEstimation<pcl::PointXYZ> estimation;
-  estimation.setInputCloud(cloud.points);
-  if (!cloud.covariances.empty())
-    estimation.setInputCovariances(
-        std::make_shared<const Covariances>(cloud.covariances));
-  estimation.setSensor(sensor);
-  estimation.setSensorPose(cloud.sensor_pose);
-  estimation.setOptions(options);
-  estimation.setSeedsFromSampler(true);
-  pcl::PointCloud<PatchPoint> points;
-  estimation.compute(points);
-  ExtractionResult result = sortOut(estimation.getResults());
-  result.notices = estimation.getNotices();
-  return result;
-}
-
 ExtractionResult
 extract(const RangeCloud& cloud, const Sensor& sensor, const FitSettings& settings)
 {
@@ -164,11 +115,35 @@ extract(const RangeCloud& cloud, const Sensor& sensor, const FitSettings& settin
   ExtractionOptions options = settings.extraction.options;
   options.progress = [&bar](int done, int total) { bar.update(done, total); };
   return settings.whole ? extractWhole(cloud, sensor, options) :
-                          estimatePatches(cloud, sensor, options);
+                          extractPatches(cloud, sensor, options);
+}
+
+/// The cloud of a file with the sensor that took it, and what had to be decided.
+struct Input {
+  RangeCloud cloud;
+  Sensor sensor;
+  std::vector<std::string> notices;
+};
+
+Input
+loadInput(const std::string& path, const Sensor& nominal, const FitSettings& settings)
+{
+  Input input;
+  CloudFileInfo info;
+  input.cloud = loadCloud(path, loadOptions(settings.input, nominal), &info);
+  input.notices = inputNotices(settings.input, info);
+  std::string notice;
+  input.sensor = matchedSensor(nominal, input.cloud, &notice);
+  if (!notice.empty())
+    input.notices.push_back(notice);
+  if (settings.sigma_m > 0.0)
+    input.sensor = withConstantNoise(input.sensor, settings.sigma_m);
+  return input;
 }
 
 /// The road from a file to its patches.
-/// \return false when the results are written but something was wrong with the cloud.
+/// \return false when the results are written but some covariances of the cloud are
+/// none.
 bool
 fitCloud(const std::string& path,
          const Sensor& nominal,
@@ -181,28 +156,23 @@ fitCloud(const std::string& path,
   report.whole = settings.whole;
 
   const Stopwatch loading;
-  CloudFileInfo info;
-  const RangeCloud cloud = loadCloud(path, loadOptions(settings.input, nominal), &info);
-  std::string intrinsics_notice;
-  report.sensor = matchedSensor(nominal, cloud, &intrinsics_notice);
-  report.sensor_pose = cloud.sensor_pose;
+  const Input input = loadInput(path, nominal, settings);
+  report.sensor_pose = input.cloud.sensor_pose;
+  report.offset = input.cloud.offset;
+  report.covariances_of_cloud = !input.cloud.covariances.empty();
   report.load_ms = loading.milliseconds();
-  const bool clean = checkCovariances(path, cloud);
 
   const Stopwatch fitting;
-  report.result = extract(cloud, report.sensor, settings);
+  report.result = extract(input.cloud, input.sensor, settings);
   report.fit_ms = fitting.milliseconds();
+  std::vector<std::string>& notices = report.result.notices;
+  notices.insert(notices.begin(), input.notices.begin(), input.notices.end());
 
-  if (!settings.quiet) {
-    printNotices(path, inputNotices(settings.input, info));
-    if (!intrinsics_notice.empty())
-      printNotices(path, {intrinsics_notice});
-    printNotices(path, neighborhoodNotices(settings, cloud));
-    printNotices(path, report.result.notices);
-  }
+  if (!settings.quiet)
+    printNotices(path, notices);
   checkPatches(report);
   output.write(report);
-  return clean;
+  return report.result.points.invalid_covariance == 0;
 }
 
 int

@@ -11,6 +11,32 @@ const Choices<SeedStrategy> kSeedStrategies{{"grid", SeedStrategy::Grid},
                                             {"random", SeedStrategy::Random},
                                             {"poisson", SeedStrategy::Poisson}};
 
+const Choices<NormalSide> kNormalSides{{"viewpoint", NormalSide::Viewpoint},
+                                       {"outward", NormalSide::Outward},
+                                       {"up", NormalSide::Up}};
+
+/// What takes the place of a sensor where there was none, or several places of it.
+void
+addSurveyOptions(CLI::App& command, FitSettings& settings)
+{
+  command
+      .add_option("--sigma",
+                  settings.sigma_m,
+                  "Noise of every point in every direction, metres, in place of the "
+                  "sensor's: for laser scanners, surveys and models")
+      ->check(positiveNumber("M"))
+      ->type_name("")
+      ->group("Input");
+  addChoice(command,
+            "--orient",
+            settings.extraction.options.normal_side,
+            kNormalSides,
+            "Side of the normals: that of the sensor; away from the middle of the "
+            "cloud, for models seen from all sides; or that of +z, for ground surveys")
+      ->default_str("viewpoint")
+      ->group("Input");
+}
+
 void
 addSeedOptions(CLI::App& command, SamplerOptions& sampler)
 {
@@ -75,6 +101,7 @@ void
 addFitOptions(CLI::App& command, FitSettings& settings)
 {
   addInputOptions(command, settings.input);
+  addSurveyOptions(command, settings);
   command.add_flag("--whole", settings.whole, "One patch to all points of the cloud")
       ->group("Patches");
   addExtractionOptions(command, settings.extraction);

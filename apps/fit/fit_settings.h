@@ -11,6 +11,7 @@ namespace holdfast::app {
 /// Everything the command line of `holdfast fit` decides.
 struct FitSettings {
   InputOptions input;
+  double sigma_m = 0.0; ///< 0: the noise of the sensor
   bool whole = false;
   ExtractionSettings extraction;
   std::string output_folder; ///< empty: no files

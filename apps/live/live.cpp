@@ -173,7 +173,6 @@ LiveSession::write(const RangeFrame& frame, PatchReport& report)
 {
   report.cloud = frameName(statistics_.frames());
   report.timestamp_us = frame.timestamp_us;
-  report.sensor = sensor_;
   report.options = settings_.extraction.options;
   if (json_)
     json_->write(report);

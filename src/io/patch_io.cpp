@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <iomanip>
 #include <stdexcept>
 
 namespace holdfast {
@@ -62,13 +63,24 @@ matrixJson(const ParameterMatrix& m)
   return rows;
 }
 
-Json
-sensorJson(const Sensor& sensor, const Pose& pose)
+/// What the covariances of the points came from.
+std::string
+noiseName(const PatchReport& report)
 {
+  return report.covariances_of_cloud ? "covariances of the cloud" :
+         report.result.sensor.noise  ? report.result.sensor.noise->name() :
+                                       "none";
+}
+
+Json
+sensorJson(const PatchReport& report)
+{
+  const Sensor& sensor = report.result.sensor;
   const Camera& camera = sensor.camera;
-  const Eigen::Quaterniond q(pose.R);
+  const Eigen::Quaterniond q(report.sensor_pose.R);
+  const Eigen::Vector3d position = report.sensor_pose.c + report.offset;
   return {{"name", sensor.name},
-          {"noise", sensor.noise ? Json(sensor.noise->name()) : Json()},
+          {"noise", noiseName(report)},
           {"camera",
            {{"width", camera.width},
             {"height", camera.height},
@@ -76,8 +88,21 @@ sensorJson(const Sensor& sensor, const Pose& pose)
             {"fy", camera.fy},
             {"cx", camera.cx},
             {"cy", camera.cy}}},
-          {"position", vectorJson(pose.c)},
-          {"orientation_wxyz", {q.w(), q.x(), q.y(), q.z()}}};
+          {"position", vectorJson(position)},
+          {"orientation_wxyz", {q.w(), q.x(), q.y(), q.z()}},
+          {"viewpoint_credible", report.result.viewpoint_is_credible}};
+}
+
+Json
+pointsJson(const PointAccounting& points)
+{
+  return {{"in_file", points.in_cloud},
+          {"invalid", points.invalid},
+          {"behind_camera", points.behind_camera},
+          {"out_of_view", points.out_of_view},
+          {"invalid_covariance", points.invalid_covariance},
+          {"duplicate", points.duplicate},
+          {"used", points.used}};
 }
 
 /// Null where there is none.
@@ -149,18 +174,22 @@ optionsJson(const PatchReport& report)
 }
 
 Json
-patchJson(const ExtractedPatch& extracted, CovarianceMode mode)
+patchJson(const ExtractedPatch& extracted, const PatchReport& report)
 {
   const FitResult& fit = extracted.fit;
   const PatchType type = fit.patch.type;
+  const CovarianceMode mode = report.options.covariance;
+  Patch in_file = fit.patch;
+  in_file.c += report.offset;
   Json seed;
   if (extracted.seed_index)
-    seed = {{"index", *extracted.seed_index}, {"point", vectorJson(extracted.seed)}};
+    seed = {{"index", *extracted.seed_index},
+            {"point", vectorJson(extracted.seed + report.offset)}};
   Json json{{"surface", surfaceName(type.surface)},
             {"boundary", boundaryName(type.boundary)},
             {"dof", degreesOfFreedom(type)},
             {"names", parameterNames(type)},
-            {"parameters", vectorJson(pack(fit.patch))},
+            {"parameters", vectorJson(pack(in_file))},
             {"covariance", matrixJson(fit.covariance)},
             {"covariance_mode", covarianceModeName(mode)},
             {"status", statusName(fit.status)},
@@ -322,7 +351,7 @@ patchFromJson(const Json& json)
 
 /// All meshes as one.
 struct ColoredMesh {
-  std::vector<Eigen::Vector3f> vertices;
+  std::vector<Eigen::Vector3d> vertices;
   std::vector<std::array<std::uint8_t, 3>> colors; ///< one per vertex
   std::vector<std::array<std::int32_t, 3>> triangles;
 };
@@ -339,7 +368,7 @@ shadedColor(const ExtractedPatch& extracted)
 }
 
 ColoredMesh
-meshOf(const std::vector<ExtractedPatch>& patches)
+meshOf(const std::vector<ExtractedPatch>& patches, const Eigen::Vector3d& offset)
 {
   ColoredMesh all;
   for (const ExtractedPatch& extracted : patches) {
@@ -349,7 +378,7 @@ meshOf(const std::vector<ExtractedPatch>& patches)
     const Mesh mesh = tessellate(patch, length / 8.0);
     const auto first = static_cast<std::int32_t>(all.vertices.size());
     for (const Eigen::Vector3d& vertex : mesh.vertices)
-      all.vertices.emplace_back(vertex.cast<float>());
+      all.vertices.push_back(vertex + offset);
     all.colors.resize(all.vertices.size(), shadedColor(extracted));
     for (const auto& t : mesh.triangles)
       all.triangles.push_back({first + t[0], first + t[1], first + t[2]});
@@ -366,12 +395,15 @@ writeRaw(std::ostream& out, const T* values, std::size_t n)
 }
 
 void
-writeMeshText(std::ostream& out, const ColoredMesh& mesh)
+writeMeshText(std::ostream& out, const ColoredMesh& mesh, bool in_double)
 {
-  out.precision(9);
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
-    const auto& v = mesh.vertices[i];
-    out << v.x() << ' ' << v.y() << ' ' << v.z();
+    const Eigen::Vector3d& v = mesh.vertices[i];
+    if (in_double)
+      out << std::setprecision(17) << v.x() << ' ' << v.y() << ' ' << v.z();
+    else
+      out << std::setprecision(9) << static_cast<float>(v.x()) << ' '
+          << static_cast<float>(v.y()) << ' ' << static_cast<float>(v.z());
     for (const std::uint8_t channel : mesh.colors[i])
       out << ' ' << static_cast<int>(channel);
     out << '\n';
@@ -381,10 +413,14 @@ writeMeshText(std::ostream& out, const ColoredMesh& mesh)
 }
 
 void
-writeMeshBinary(std::ostream& out, const ColoredMesh& mesh)
+writeMeshBinary(std::ostream& out, const ColoredMesh& mesh, bool in_double)
 {
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
-    writeRaw(out, mesh.vertices[i].data(), 3);
+    const Eigen::Vector3f single = mesh.vertices[i].cast<float>();
+    if (in_double)
+      writeRaw(out, mesh.vertices[i].data(), 3);
+    else
+      writeRaw(out, single.data(), 3);
     writeRaw(out, mesh.colors[i].data(), 3);
   }
   for (const auto& t : mesh.triangles) {
@@ -408,14 +444,17 @@ writeJson(std::ostream& out, const PatchReport& report, JsonLayout layout)
   member("cloud", report.cloud);
   if (report.timestamp_us)
     member("timestamp_us", *report.timestamp_us);
-  member("sensor", sensorJson(report.sensor, report.sensor_pose));
+  member("sensor", sensorJson(report));
+  member("offset", vectorJson(report.offset));
+  member("cloud_points", pointsJson(report.result.points));
+  member("notices", report.result.notices);
   member("options", optionsJson(report));
   out << "\"patches\":[" << gap;
   for (std::size_t i = 0; i < report.result.patches.size(); ++i)
     out << (i == 0   ? "" :
             one_line ? "," :
                        ",\n")
-        << text(patchJson(report.result.patches[i], report.options.covariance));
+        << text(patchJson(report.result.patches[i], report));
   out << gap << "]," << gap;
   member("rejected", rejectedJson(report.result));
   out << "\"timing\":" << text(timingJson(report)) << gap << "}\n";
@@ -428,8 +467,17 @@ readJson(const std::string& text)
     const Json json = Json::parse(text);
     PatchReport report;
     report.cloud = json.at("cloud");
-    for (const Json& patch : json.at("patches"))
+    // Files of earlier versions have none.
+    if (const auto offset = json.find("offset"); offset != json.end())
+      for (std::size_t i = 0; i < 3; ++i)
+        report.offset(static_cast<Eigen::Index>(i)) = offset->at(i);
+    for (const Json& patch : json.at("patches")) {
       report.result.patches.push_back(patchFromJson(patch));
+      ExtractedPatch& read = report.result.patches.back();
+      read.fit.patch.c -= report.offset;
+      if (read.seed_index)
+        read.seed -= report.offset;
+    }
     readRejected(json.at("rejected"), report.result);
     return report;
   }
@@ -439,20 +487,27 @@ readJson(const std::string& text)
 }
 
 void
-writeMesh(std::ostream& out, const std::vector<ExtractedPatch>& patches, bool ascii)
+writeMesh(std::ostream& out,
+          const std::vector<ExtractedPatch>& patches,
+          bool ascii,
+          const Eigen::Vector3d& offset)
 {
-  const ColoredMesh mesh = meshOf(patches);
+  const ColoredMesh mesh = meshOf(patches, offset);
+  // What was shifted to fit into float does not fit into it.
+  const bool in_double = !offset.isZero(0.0);
+  const std::string type = in_double ? "double" : "float";
   out << "ply\nformat " << (ascii ? "ascii" : "binary_little_endian")
       << " 1.0\ncomment bounded patches, coloured by surface type\nelement vertex "
-      << mesh.vertices.size()
-      << "\nproperty float x\nproperty float y\nproperty float z\n"
+      << mesh.vertices.size() << "\nproperty " << type << " x\nproperty " << type
+      << " y\nproperty " << type
+      << " z\n"
          "property uchar red\nproperty uchar green\nproperty uchar blue\nelement face "
       << mesh.triangles.size()
       << "\nproperty list uchar int vertex_indices\nend_header\n";
   if (ascii)
-    writeMeshText(out, mesh);
+    writeMeshText(out, mesh, in_double);
   else
-    writeMeshBinary(out, mesh);
+    writeMeshBinary(out, mesh, in_double);
 }
 
 void

@@ -28,6 +28,7 @@ checked(ExtractionOptions options)
     sampler.max_seeds = kSeedsPerPatch * std::min(sampler.max_patches, kMostPatches);
   if (sampler.max_seeds == 0)
     throw std::invalid_argument("a stream needs a number of seeds or patches");
+  options.keep_failures = true; // a seed's next turn depends on its last
   return options;
 }
 
@@ -76,17 +77,19 @@ FrameExtractor::restart(int width, int height)
 ExtractionResult
 FrameExtractor::extract(const RangeCloud& frame)
 {
-  const PatchExtractor extractor(frame, sensor_, options_);
+  if (const std::string error = validityError(frame); !error.empty())
+    throw std::invalid_argument(error);
   const int width = static_cast<int>(frame.points->width);
   const int height = static_cast<int>(frame.points->height);
   if (height < 2)
     throw std::invalid_argument("a frame must be an organized cloud");
   if (width != width_ || height != height_)
     restart(width, height);
-  const NeighborhoodSampler sampler(frame, extractor.sensor(), options_.sampler);
-  std::vector<ExtractedPatch> attempts = extractor.fitWithinLimits(seeds_, sampler);
-  putFailuresLast(attempts, seeds_);
-  return sortOut(std::move(attempts), extractor);
+  ExtractionResult result =
+      extractPatches(frame, sensor_, options_, {seedsAt(frame, seeds_), {}});
+  putFailuresLast(result.patches, seeds_);
+  result.patches = acceptedAmong(std::move(result.patches));
+  return result;
 }
 
 } // namespace holdfast

@@ -208,13 +208,13 @@ chooseSensorPose(const pcl::PointCloud<pcl::PointXYZ>::ConstPtr& points,
                  const Pose& file_pose,
                  std::string* notice)
 {
-  if (isTakenFrom({points, {}, file_pose}))
-    return file_pose;
-  if (!isTakenFrom({points, {}, Pose{}}))
+  const bool has_position = !file_pose.c.isZero(0.0);
+  if (has_position || isTakenFrom({points, {}, file_pose}) ||
+      !isTakenFrom({points, {}, Pose{}}))
     return file_pose;
   if (notice != nullptr)
-    *notice = "the points are in the camera frame: the sensor pose of the file, which "
-              "contradicts them, is not used";
+    *notice = "the points are in the camera frame: the sensor's orientation in the "
+              "file, which contradicts them, is not used";
   return Pose{};
 }
 

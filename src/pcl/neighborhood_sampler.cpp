@@ -376,6 +376,15 @@ NeighborhoodSampler::Impl::seeds() const
   return {};
 }
 
+SamplerOptions
+withoutLimits(SamplerOptions options)
+{
+  options.max_patches = 0;
+  options.max_area_m2 = 0.0;
+  options.max_time_s = 0.0;
+  return options;
+}
+
 std::string
 validityError(const SamplerOptions& options)
 {
@@ -418,6 +427,12 @@ const SamplerOptions&
 NeighborhoodSampler::options() const
 {
   return impl_->options;
+}
+
+bool
+NeighborhoodSampler::usesPixels() const
+{
+  return impl_->grid.has_value();
 }
 
 NeighborhoodSampler::ScratchPtr

@@ -1,18 +1,18 @@
 #include <holdfast/pcl/patch_extraction.h>
 
-#include "sampling_budget.h"
 #include <holdfast/patch/boundary.h>
-#include <holdfast/sensor/constant_noise_model.h>
 
+#include "extraction_advice.h"
 #include "parallel/parallel_for.h"
 #include "point_gatherer.h"
+#include "point_selection.h"
+#include "sampling_budget.h"
 
 #include <pcl/common/point_tests.h>
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
-#include <exception>
+#include <memory>
 #include <mutex>
 #include <stdexcept>
 #include <utility>
@@ -21,14 +21,19 @@ namespace holdfast {
 
 namespace {
 
-/// Standard deviation assumed where the sensor's model cannot hold, m.
-constexpr double kUnknownSigma = 1e-3;
-
 void
 requireValid(const std::string& error)
 {
   if (!error.empty())
     throw std::invalid_argument(error);
+}
+
+void
+requireValid(const ExtractionOptions& options)
+{
+  requireValid(validityError(options.fit));
+  requireValid(options.validation ? validityError(*options.validation) : "");
+  requireValid(options.threads < 0 ? "the number of threads must not be negative" : "");
 }
 
 Eigen::Vector3d
@@ -47,74 +52,123 @@ finitePoints(const RangeCloud& cloud)
   return finite;
 }
 
-/// Whether the sensor may have measured the point, with a factor of two for wide
-/// lenses and long looks.
-bool
-isInView(const Sensor& sensor, const Eigen::Vector3d& in_camera)
+Eigen::Vector3d
+centroid(const RangeCloud& cloud, const std::vector<int>& indices)
 {
-  if (!(in_camera.z() > 0.0 && in_camera.z() <= 2.0 * sensor.max_range_m))
-    return false;
-  const Eigen::Vector2d pixel = sensor.camera.project(in_camera);
-  return std::abs(pixel.x() - sensor.camera.cx) <= sensor.camera.width &&
-         std::abs(pixel.y() - sensor.camera.cy) <= sensor.camera.height;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < indices.size(); ++i)
+    mean += (position(cloud, indices[i]) - mean) / static_cast<double>(i + 1);
+  return mean;
 }
 
-bool
-isMostlyOutOfView(const RangeCloud& cloud, const Sensor& sensor)
+/// Turns the points around a place into a patch. Refers to the selection.
+class PatchMaker {
+public:
+  PatchMaker(const PointSelection& chosen, const ExtractionOptions& options)
+  : fit_(seenFrom(options.fit, chosen.cloud.sensor_pose.c))
+  , mode_(options.covariance)
+  , side_(options.normal_side)
+  , gatherer_(chosen.cloud, chosen.sensor.noise, options.fit.noise_at_surface)
+  , estimator_(fit_, mode_)
+  , validation_(options.validation)
+  {
+    if (side_ == NormalSide::Outward)
+      middle_ = centroid(chosen.cloud, finitePoints(chosen.cloud));
+  }
+
+  /// \param batch working memory
+  ExtractedPatch make(const std::vector<int>& indices,
+                      const Eigen::Vector3d& place,
+                      PointBatch& batch) const
+  {
+    ExtractedPatch patch;
+    gatherer_.gather(indices, place, batch);
+    patch.fit = estimatorAt(place).estimate(batch);
+    if (validation_)
+      patch.validation = validate(patch.fit, batch, *validation_);
+    return patch;
+  }
+
+private:
+  static FitOptions seenFrom(FitOptions fit, const Eigen::Vector3d& viewpoint)
+  {
+    fit.viewpoint = viewpoint;
+    return fit;
+  }
+
+  /// The estimator whose normals show to the right side of a place.
+  PatchEstimator estimatorAt(const Eigen::Vector3d& place) const
+  {
+    constexpr double kFar = 1e3; // many patches away
+    switch (side_) {
+    case NormalSide::Viewpoint:
+      break;
+    case NormalSide::Outward:
+      return PatchEstimator(seenFrom(fit_, place + kFar * (place - middle_)), mode_);
+    case NormalSide::Up:
+      return PatchEstimator(seenFrom(fit_, place + kFar * Eigen::Vector3d::UnitZ()),
+                            mode_);
+    }
+    return estimator_;
+  }
+
+  FitOptions fit_;
+  CovarianceMode mode_;
+  NormalSide side_;
+  Eigen::Vector3d middle_ = Eigen::Vector3d::Zero();
+  PointGatherer gatherer_;
+  PatchEstimator estimator_;
+  std::optional<ValidationOptions> validation_;
+};
+
+/// Seeds and neighbourhoods, with nothing left open.
+struct CompleteSites {
+  std::vector<Seed> seeds;
+  NeighborhoodSearch search;
+  double radius_m = 0.0; ///< of the neighbourhoods; 0: they have none
+  bool promising = true; ///< else it has been said what is wrong
+};
+
+/// The neighbourhoods of a sampler, whose lifetime they share.
+NeighborhoodSearch
+searchOf(const std::shared_ptr<const NeighborhoodSampler>& sampler, int threads)
 {
-  const std::vector<int> finite = finitePoints(cloud);
-  const auto out_of_view = std::count_if(finite.begin(), finite.end(), [&](int index) {
-    return !isInView(sensor, cloud.sensor_pose.toLocal(position(cloud, index)));
-  });
-  return 2 * static_cast<std::size_t>(out_of_view) > finite.size();
+  auto scratch = std::make_shared<std::vector<NeighborhoodSampler::ScratchPtr>>();
+  for (int thread = 0; thread < threads; ++thread)
+    scratch->push_back(sampler->makeScratch());
+  return [sampler, scratch](const Seed& seed, int thread, std::vector<int>& indices) {
+    sampler->neighborhood(seed.index, *(*scratch)[thread], indices);
+  };
 }
 
-Sensor
-withConstantNoise(Sensor sensor)
+CompleteSites
+completeSites(const PatchSites& asked,
+              const ExtractionOptions& options,
+              const PointSelection& chosen,
+              std::vector<std::string>& notices)
 {
-  sensor.noise = std::make_shared<const ConstantNoiseModel>(
-      ConstantNoiseModel::Parameters{kUnknownSigma, kUnknownSigma});
-  return sensor;
-}
-
-/// The sensor itself, or one with constant noise where its own means nothing or, since
-/// the cloud brings its covariances, is not asked.
-Sensor
-applicableSensor(const RangeCloud& cloud,
-                 const Sensor& sensor,
-                 std::vector<std::string>& notices)
-{
-  requireValid(validityError(cloud));
-  const bool has_covariances = !cloud.covariances.empty();
-  requireValid(sensor.noise || has_covariances ?
-                   "" :
-                   "the cloud has no covariances, and the sensor no noise model");
-  if (!sensor.noise)
-    return withConstantNoise(sensor);
-  const bool organized = cloud.points->height > 1;
-  if (has_covariances || sensor.noise->isOmnidirectional() || organized ||
-      !isMostlyOutOfView(cloud, sensor))
-    return sensor;
-  notices.push_back("most points lie where the sensor " + sensor.name +
-                    " cannot see: a noise of 1 mm in every direction is assumed; "
-                    "another sensor or a covariance field changes that");
-  return withConstantNoise(sensor);
-}
-
-FitOptions
-checkedFitOptions(const RangeCloud& cloud, const ExtractionOptions& options)
-{
-  FitOptions fit = options.fit;
-  fit.viewpoint = cloud.sensor_pose.c;
-  requireValid(validityError(fit));
-  return fit;
-}
-
-int
-checkedThreads(int threads)
-{
-  requireValid(threads < 0 ? "the number of threads must not be negative" : "");
-  return threadCount(threads);
+  const bool knn = options.sampler.neighborhood == Neighborhood::Knn;
+  CompleteSites sites;
+  sites.radius_m = knn ? 0.0 : options.sampler.radius_m;
+  sites.search = asked.search;
+  if (asked.seeds)
+    sites.seeds = *asked.seeds;
+  if (asked.search)
+    return sites;
+  const auto sampler = std::make_shared<const NeighborhoodSampler>(chosen.cloud,
+                                                                   chosen.sensor,
+                                                                   options.sampler);
+  sites.search = searchOf(sampler, threadCount(options.threads));
+  if (const std::string notice = fallbackNotice(*sampler, chosen.cloud);
+      !notice.empty())
+    notices.push_back(notice);
+  if (!asked.seeds) {
+    sites.seeds = seedsAt(chosen.cloud, sampler->seeds());
+    const std::size_t before = sites.seeds.size();
+    keepPromisingSeeds(chosen, options.sampler, sites.search, sites.seeds, notices);
+    sites.promising = sites.seeds.size() == before;
+  }
+  return sites;
 }
 
 /// Looks at attempts in the order of their seeds, in whatever order the threads come to
@@ -126,10 +180,10 @@ public:
   : is_done_(attempts, false), look_(std::move(look))
   {}
 
-  void finish(int attempt)
+  void finish(std::size_t attempt)
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    is_done_[static_cast<std::size_t>(attempt)] = true;
+    is_done_[attempt] = true;
     while (!over_ && seen_ < is_done_.size() && is_done_[seen_])
       over_ = look_(seen_++);
   }
@@ -153,211 +207,93 @@ private:
   std::atomic<bool> over_{false};
 };
 
-} // namespace
-
-struct PatchExtractor::Impl {
-  Impl(const RangeCloud& the_cloud, const Sensor& nominal, const ExtractionOptions& o)
-  : cloud(the_cloud)
-  , sensor(applicableSensor(cloud, nominal, notices))
-  , radius_m(o.sampler.neighborhood == Neighborhood::Knn ? 0.0 : o.sampler.radius_m)
-  , validation(o.validation)
-  , progress(o.progress)
-  , threads(checkedThreads(o.threads))
-  , estimator(checkedFitOptions(cloud, o), o.covariance)
-  , gatherer(cloud, sensor.noise, o.fit.noise_at_surface)
-  {
-    requireValid(validation ? validityError(*validation) : "");
-  }
-
-  /// \param batch working memory
-  ExtractedPatch attempt(const std::vector<int>& indices,
-                         const Eigen::Vector3d& origin,
-                         PointBatch& batch) const;
-
-  /// Fills attempts[i] and calls done(i), for every seed unless skip().
-  void fitAround(const std::vector<Seed>& seeds,
-                 const NeighborhoodSearch& search,
-                 const std::function<bool()>& skip,
-                 const std::function<void(int)>& done,
-                 std::vector<ExtractedPatch>& attempts) const;
-
-  std::vector<Seed> places(const std::vector<int>& indices) const;
-
-  /// Refers to the sampler.
-  NeighborhoodSearch searchOf(const NeighborhoodSampler& sampler) const;
-
-  const SamplingBudget::Clock::time_point start = SamplingBudget::Clock::now();
-  const RangeCloud& cloud;
-  std::vector<std::string> notices;
-  Sensor sensor;
-  double radius_m;
-  std::optional<ValidationOptions> validation;
-  Progress progress;
-  int threads;
-  PatchEstimator estimator;
-  PointGatherer gatherer;
-};
-
-ExtractedPatch
-PatchExtractor::Impl::attempt(const std::vector<int>& indices,
-                              const Eigen::Vector3d& origin,
-                              PointBatch& batch) const
-{
-  ExtractedPatch patch;
-  gatherer.gather(indices, origin, batch);
-  patch.fit = estimator.estimate(batch);
-  if (validation)
-    patch.validation = validate(patch.fit, batch, *validation);
-  return patch;
-}
-
-void
-PatchExtractor::Impl::fitAround(const std::vector<Seed>& seeds,
-                                const NeighborhoodSearch& search,
-                                const std::function<bool()>& skip,
-                                const std::function<void(int)>& done,
-                                std::vector<ExtractedPatch>& attempts) const
+/// One attempt per seed in their order, until the budget is spent.
+std::vector<ExtractedPatch>
+attemptAll(const CompleteSites& sites,
+           const PatchMaker& maker,
+           const ExtractionOptions& options,
+           SamplingBudget& budget)
 {
   struct Workspace {
     std::vector<int> indices;
     PointBatch batch;
   };
-  std::vector<Workspace> workspaces(static_cast<std::size_t>(threads));
-  const auto fit_one = [&](int i, int thread) {
-    if (skip())
-      return;
-    const Seed& seed = seeds[i];
-    Workspace& work = workspaces[thread];
-    search(seed, thread, work.indices);
-    attempts[i] = attempt(work.indices, seed.position, work.batch);
-    attempts[i].seed_index = seed.index;
-    attempts[i].seed = seed.position;
-    attempts[i].radius_m = radius_m;
-    done(i);
-  };
-  parallelFor(static_cast<int>(seeds.size()), threads, fit_one, progress);
-}
-
-std::vector<Seed>
-PatchExtractor::Impl::places(const std::vector<int>& indices) const
-{
-  std::vector<Seed> seeds;
-  seeds.reserve(indices.size());
-  for (const int index : indices)
-    seeds.push_back({index, position(cloud, index)});
-  return seeds;
-}
-
-NeighborhoodSearch
-PatchExtractor::Impl::searchOf(const NeighborhoodSampler& sampler) const
-{
-  auto scratch = std::make_shared<std::vector<NeighborhoodSampler::ScratchPtr>>();
-  for (int thread = 0; thread < threads; ++thread)
-    scratch->push_back(sampler.makeScratch());
-  return [&sampler, scratch](const Seed& seed, int thread, std::vector<int>& indices) {
-    sampler.neighborhood(seed.index, *(*scratch)[thread], indices);
-  };
-}
-
-PatchExtractor::PatchExtractor(const RangeCloud& cloud,
-                               const Sensor& sensor,
-                               const ExtractionOptions& options)
-: impl_(std::make_unique<const Impl>(cloud, sensor, options))
-{}
-
-PatchExtractor::~PatchExtractor() = default;
-
-std::vector<ExtractedPatch>
-PatchExtractor::fitAround(const std::vector<Seed>& seeds,
-                          const NeighborhoodSearch& search) const
-{
-  std::vector<ExtractedPatch> attempts(seeds.size());
-  impl_->fitAround(
-      seeds,
-      search,
-      [] { return false; },
-      [](int) {},
-      attempts);
-  return attempts;
-}
-
-std::vector<ExtractedPatch>
-PatchExtractor::fitAround(const std::vector<int>& seeds,
-                          const NeighborhoodSampler& sampler) const
-{
-  return fitAround(impl_->places(seeds), impl_->searchOf(sampler));
-}
-
-std::vector<ExtractedPatch>
-PatchExtractor::fitWithinLimits(const std::vector<int>& seeds,
-                                const NeighborhoodSampler& sampler,
-                                std::string* notice) const
-{
-  if (!isLimited(sampler.options()))
-    return fitAround(seeds, sampler);
-  const std::vector<Seed> places = impl_->places(seeds);
-  std::vector<ExtractedPatch> attempts(seeds.size());
-  SamplingBudget budget(sampler.options(), impl_->cloud.points->size(), impl_->start);
-  const NeighborhoodSearch search_again = impl_->searchOf(sampler);
-  std::vector<int> indices;
-  InOrder count(seeds.size(), [&](std::size_t i) {
-    if (isAccepted(attempts[i])) {
-      if (budget.limitsArea())
-        search_again(places[i], 0, indices);
-      budget.cover(indices, projectedArea(attempts[i].fit.patch));
-    }
+  std::vector<Workspace> workspaces(
+      static_cast<std::size_t>(threadCount(options.threads)));
+  std::vector<ExtractedPatch> attempts(sites.seeds.size());
+  // The points of attempts that wait to be looked at, where covered area counts.
+  std::vector<std::vector<int>> covered(budget.limitsArea() ? attempts.size() : 0);
+  InOrder count(attempts.size(), [&](std::size_t i) {
+    const std::vector<int> points =
+        covered.empty() ? std::vector<int>() : std::move(covered[i]);
+    if (isAccepted(attempts[i]))
+      budget.cover(points, projectedArea(attempts[i].fit.patch));
     return budget.isFull();
   });
-  impl_->fitAround(
-      places,
-      impl_->searchOf(sampler),
-      [&] { return count.isOver() || budget.isOutOfTime(); },
-      [&](int i) { count.finish(i); },
-      attempts);
+  const auto attempt = [&](int item, int thread) {
+    if (count.isOver() || budget.isOutOfTime())
+      return;
+    const auto i = static_cast<std::size_t>(item);
+    const Seed& seed = sites.seeds[i];
+    Workspace& work = workspaces[static_cast<std::size_t>(thread)];
+    sites.search(seed, thread, work.indices);
+    attempts[i] = maker.make(work.indices, seed.position, work.batch);
+    attempts[i].seed_index = seed.index;
+    attempts[i].seed = seed.position;
+    attempts[i].radius_m = sites.radius_m;
+    if (!covered.empty())
+      covered[i] = work.indices;
+    count.finish(i);
+  };
+  parallelFor(static_cast<int>(attempts.size()),
+              options.threads,
+              attempt,
+              options.progress);
   attempts.resize(count.seen());
-  if (notice && attempts.size() < seeds.size())
-    *notice = "stopped at the limit of patches, area or time after " +
-              std::to_string(attempts.size()) + " of " + std::to_string(seeds.size()) +
-              " seeds";
   return attempts;
 }
 
-std::vector<ExtractedPatch>
-PatchExtractor::fitSampled(const NeighborhoodSampler& sampler,
-                           std::string* notice) const
+/// Attempts into patches and reasons.
+void
+sortOut(std::vector<ExtractedPatch> attempts,
+        bool keep_failures,
+        ExtractionResult& result)
 {
-  return fitWithinLimits(sampler.seeds(), sampler, notice);
+  for (ExtractedPatch& patch : attempts) {
+    const bool accepted = isAccepted(patch);
+    if (!accepted && isUsable(patch.fit.status))
+      ++result.turned_down[patch.validation->verdict];
+    else if (!accepted)
+      ++result.rejected[patch.fit.status];
+    if (accepted || keep_failures)
+      result.patches.push_back(std::move(patch));
+  }
 }
 
-ExtractedPatch
-PatchExtractor::fitWhole() const
+/// What is known before the first fit.
+ExtractionResult
+resultOf(const PointSelection& chosen, const ExtractionOptions& options)
 {
-  const std::vector<int> indices = finitePoints(impl_->cloud);
-  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();
-  for (std::size_t i = 0; i < indices.size(); ++i)
-    centroid +=
-        (position(impl_->cloud, indices[i]) - centroid) / static_cast<double>(i + 1);
-  PointBatch batch;
-  return impl_->attempt(indices, centroid, batch);
+  ExtractionResult result;
+  result.points = chosen.points;
+  result.sensor = chosen.sensor;
+  result.viewpoint_is_credible = chosen.viewpoint_is_credible;
+  result.notices = chosen.notices;
+  if (!chosen.viewpoint_is_credible && options.normal_side == NormalSide::Viewpoint)
+    result.notices.push_back(viewpointNotice(chosen.cloud));
+  return result;
 }
 
-const Sensor&
-PatchExtractor::sensor() const
+void
+noteLimit(std::size_t tried, std::size_t seeds, std::vector<std::string>& notices)
 {
-  return impl_->sensor;
+  if (tried < seeds)
+    notices.push_back("stopped at the limit of patches, area or time after " +
+                      std::to_string(tried) + " of " + std::to_string(seeds) +
+                      " seeds");
 }
 
-const std::vector<std::string>&
-PatchExtractor::notices() const
-{
-  return impl_->notices;
-}
-
-int
-PatchExtractor::countInvalidCovariances() const
-{
-  return impl_->gatherer.countInvalidCovariances();
-}
+} // namespace
 
 bool
 isAccepted(const ExtractedPatch& patch)
@@ -366,41 +302,47 @@ isAccepted(const ExtractedPatch& patch)
          (!patch.validation || patch.validation->verdict == PatchVerdict::Accepted);
 }
 
-ExtractionResult
-sortOut(std::vector<ExtractedPatch> attempts)
+std::vector<ExtractedPatch>
+acceptedAmong(std::vector<ExtractedPatch> attempts)
 {
-  ExtractionResult result;
-  for (ExtractedPatch& patch : attempts) {
-    if (isAccepted(patch))
-      result.patches.push_back(std::move(patch));
-    else if (isUsable(patch.fit.status))
-      ++result.turned_down[patch.validation->verdict];
-    else
-      ++result.rejected[patch.fit.status];
-  }
-  return result;
+  attempts.erase(std::stable_partition(attempts.begin(), attempts.end(), isAccepted),
+                 attempts.end());
+  return attempts;
 }
 
-ExtractionResult
-sortOut(std::vector<ExtractedPatch> attempts, const PatchExtractor& extractor)
+std::vector<Seed>
+seedsAt(const RangeCloud& cloud, const std::vector<int>& indices)
 {
-  ExtractionResult result = sortOut(std::move(attempts));
-  result.invalid_covariances = extractor.countInvalidCovariances();
-  result.notices = extractor.notices();
-  return result;
+  std::vector<Seed> seeds;
+  seeds.reserve(indices.size());
+  for (const int index : indices)
+    seeds.push_back({index, position(cloud, index)});
+  return seeds;
 }
 
 ExtractionResult
 extractPatches(const RangeCloud& cloud,
                const Sensor& sensor,
-               const ExtractionOptions& options)
+               const ExtractionOptions& options,
+               const PatchSites& asked)
 {
-  const PatchExtractor extractor(cloud, sensor, options);
-  const NeighborhoodSampler sampler(cloud, extractor.sensor(), options.sampler);
-  std::string notice;
-  ExtractionResult result = sortOut(extractor.fitSampled(sampler, &notice), extractor);
-  if (!notice.empty())
-    result.notices.push_back(notice);
+  const auto start = SamplingBudget::Clock::now();
+  requireValid(options);
+  // Cloud -> points that can be used -> covariance of each -> seeds and neighbourhoods
+  // -> weighted fit -> bounded patch with covariance -> validation.
+  const PointSelection chosen = selectPoints(cloud, sensor);
+  ExtractionResult result = resultOf(chosen, options);
+  const PatchMaker maker(chosen, options);
+  const CompleteSites sites = completeSites(asked, options, chosen, result.notices);
+  SamplingBudget budget(options.sampler, chosen.cloud.points->size(), start);
+  std::vector<ExtractedPatch> attempts = attemptAll(sites, maker, options, budget);
+  if (!asked.seeds)
+    noteLimit(attempts.size(), sites.seeds.size(), result.notices);
+  sortOut(std::move(attempts), options.keep_failures, result);
+  // A stream has no time to measure an empty frame.
+  const bool is_stream = asked.seeds && isLimited(options.sampler);
+  if (sites.promising && !is_stream)
+    adviseOnNoPatches(chosen, options.sampler, result);
   return result;
 }
 
@@ -409,8 +351,16 @@ extractWhole(const RangeCloud& cloud,
              const Sensor& sensor,
              const ExtractionOptions& options)
 {
-  const PatchExtractor extractor(cloud, sensor, options);
-  return sortOut({extractor.fitWhole()}, extractor);
+  requireValid(options);
+  const PointSelection chosen = selectPoints(cloud, sensor);
+  ExtractionResult result = resultOf(chosen, options);
+  const std::vector<int> points = finitePoints(chosen.cloud);
+  PointBatch batch;
+  sortOut(
+      {PatchMaker(chosen, options).make(points, centroid(chosen.cloud, points), batch)},
+      options.keep_failures,
+      result);
+  return result;
 }
 
 } // namespace holdfast

@@ -1,9 +1,6 @@
 #include "point_gatherer.h"
 
 #include <holdfast/fit/reference_points.h>
-#include <holdfast/geometry/gaussian.h>
-
-#include <pcl/common/point_tests.h>
 
 #include <limits>
 #include <utility>
@@ -13,12 +10,6 @@ namespace holdfast {
 namespace {
 
 constexpr double kNoCovariance = std::numeric_limits<double>::quiet_NaN();
-
-bool
-isIdentity(const Pose& pose)
-{
-  return pose.R.isIdentity(0.0) && pose.c.isZero(0.0);
-}
 
 Eigen::Vector3d
 position(const RangeCloud& cloud, std::size_t index)
@@ -84,19 +75,6 @@ rotate(const Eigen::Matrix3d& R, int n, const CovarianceChannels& s)
     s.yz[i] = entry(1, 2);
     s.zz[i] = entry(2, 2);
   }
-}
-
-/// Most matrices are positive definite, which three minors show; the eigenvalues decide
-/// the rest.
-bool
-isCovariance(const Eigen::Matrix3d& S)
-{
-  if (!S.allFinite())
-    return false;
-  const double minor = S(0, 0) * S(1, 1) - S(0, 1) * S(1, 0);
-  return (S(0, 0) > 0.0 && minor > 0.0 && S.determinant() > 0.0 &&
-          S.isApprox(S.transpose())) ||
-         isPositiveSemiDefinite(S);
 }
 
 } // namespace
@@ -195,29 +173,6 @@ PointGatherer::evaluateModel(PointBatch& batch) const
       s.xx[i] = z[i] > 0.0 ? s.xx[i] : kNoCovariance;
   if (!in_camera_frame_)
     rotate(cloud_.sensor_pose.R, n, s);
-}
-
-int
-PointGatherer::countInvalidCovariances() const
-{
-  if (stored_.empty())
-    return noise_->isOmnidirectional() ? 0 : countBehindCamera();
-  int count = 0;
-  for (std::size_t i = 0; i < stored_.size(); ++i)
-    count +=
-        pcl::isFinite((*cloud_.points)[i]) && !isCovariance(stored_[i].cast<double>());
-  return count;
-}
-
-int
-PointGatherer::countBehindCamera() const
-{
-  const Eigen::Vector3f axis = cloud_.sensor_pose.R.col(2).cast<float>();
-  const Eigen::Vector3f centre = cloud_.sensor_pose.c.cast<float>();
-  int count = 0;
-  for (const pcl::PointXYZ& p : *cloud_.points)
-    count += pcl::isFinite(p) && !(axis.dot(p.getVector3fMap() - centre) > 0.0F);
-  return count;
 }
 
 } // namespace holdfast

@@ -24,14 +24,10 @@ public:
               const Eigen::Vector3d& origin,
               PointBatch& batch) const;
 
-  /// How many finite points have no usable covariance.
-  int countInvalidCovariances() const;
-
 private:
   void gatherStored(const std::vector<int>& indices, PointBatch& batch) const;
   void gatherModelled(const std::vector<int>& indices, PointBatch& batch) const;
   void evaluateModel(PointBatch& batch) const;
-  int countBehindCamera() const;
 
   const RangeCloud& cloud_;
   NoiseModel::ConstPtr noise_;

@@ -40,4 +40,11 @@ struct Pose {
   }
 };
 
+/// Exactly: no rotation, no translation.
+inline bool
+isIdentity(const Pose& pose)
+{
+  return pose.R.isIdentity(0.0) && pose.c.isZero(0.0);
+}
+
 } // namespace holdfast

@@ -16,9 +16,10 @@ namespace holdfast {
 struct PatchReport {
   std::string cloud; ///< file, or frame, the patches come from
   std::optional<std::uint64_t> timestamp_us; ///< of a frame, by the camera's clock
-  Sensor sensor; ///< as matched to the cloud
   Pose sensor_pose;
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero(); ///< RangeCloud::offset
   ExtractionOptions options;
+  bool covariances_of_cloud = false; ///< not the sensor's noise
   bool whole = false; ///< one patch to all points: the sampler options do not apply
   ExtractionResult result;
   double load_ms = 0.0;
@@ -30,22 +31,26 @@ enum class JsonLayout : std::uint8_t {
   PatchPerLine
 };
 
-/// Writes the report as one JSON object and a newline. Numbers survive the way to text
-/// and back bit for bit; those that are not finite become null.
+/// Writes the report as one JSON object and a newline, in the frame of the file: the
+/// offset is added to every position. Numbers survive the way to text and back bit for
+/// bit; those that are not finite become null.
 void writeJson(std::ostream& out, const PatchReport& report, JsonLayout layout);
 
-/// Reads the cloud's name, the patches and the rejected counts of a JSON object written
-/// by writeJson(); the other members of the report keep their defaults.
+/// Reads the cloud's name, the offset, the patches and the rejected counts of a JSON
+/// object written by writeJson(); the other members of the report keep their defaults.
+/// Positions are again those of the points, with the offset taken off.
 /// \throw std::runtime_error when the text is no such object.
 PatchReport readJson(const std::string& text);
 
 /// Writes the patches as one triangle mesh (PLY: vertices x y z in metres, red green
 /// blue, in the frame of the cloud), each with edges of about an eighth of its length.
 /// Colours go by surface type, darker where points support less of a measured patch:
-/// full at a coverage of 1, half at 0.
+/// full at a coverage of 1, half at 0. \param offset is added to the vertices, which
+/// are then written in double precision.
 void writeMesh(std::ostream& out,
                const std::vector<ExtractedPatch>& patches,
-               bool ascii);
+               bool ascii,
+               const Eigen::Vector3d& offset = Eigen::Vector3d::Zero());
 
 /// Writes the patches, one at least, as a compressed PCD of PatchPoint, which PCL and
 /// its tools read. Sets the fail bit when that does not work.

@@ -26,9 +26,10 @@ std::optional<Camera> recoverIntrinsics(const RangeCloud& cloud,
 /// VIEWPOINT: some hold points in the camera frame although VIEWPOINT carries a
 /// rotation (0 0 0 0 1 0 0) that is meant for display.
 ///
-/// \return `file_pose` if nearly all points lie in front of that camera and, when
-/// organized, on its pixels; else the identity if that holds for it, with a one-line
-/// `notice`; else `file_pose` for want of better.
+/// \return `file_pose` whenever it has a position: that was meant. An orientation alone
+/// is set aside for the identity, with a one-line `notice`, where the points contradict
+/// it and not the identity: nearly all of them lie in front of a camera in the one pose
+/// and, when organized, on its pixels, and not in the other.
 Pose chooseSensorPose(const pcl::PointCloud<pcl::PointXYZ>::ConstPtr& points,
                       const Pose& file_pose,
                       std::string* notice = nullptr);

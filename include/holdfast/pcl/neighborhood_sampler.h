@@ -49,6 +49,9 @@ struct SamplerOptions {
   double max_slope = 4.0;
 };
 
+/// The same without limits of patches, area and time.
+SamplerOptions withoutLimits(SamplerOptions options);
+
 /// Empty when the options make sense, else one sentence naming the first that does not.
 std::string validityError(const SamplerOptions& options);
 
@@ -82,6 +85,9 @@ public:
   std::vector<int> seeds() const;
 
   const SamplerOptions& options() const;
+
+  /// The cloud counts as organized.
+  bool usesPixels() const;
 
   ScratchPtr makeScratch() const;
 

@@ -91,8 +91,7 @@ public:
   }
 
   /// Everything else: fit, sampler, covariance mode, validation, threads, progress. A
-  /// radius or k set by setRadiusSearch() or setKSearch() goes before the sampler's;
-  /// fit.viewpoint is set from the sensor pose.
+  /// radius or k set by setRadiusSearch() or setKSearch() goes before the sampler's.
   void setOptions(const ExtractionOptions& options)
   {
     options_ = options;
@@ -141,13 +140,19 @@ public:
   /// double precision; empty if it failed.
   const std::vector<ExtractedPatch>& getResults() const
   {
-    return results_;
+    return result_.patches;
+  }
+
+  /// The same with how many failed and why, and what became of the points.
+  const ExtractionResult& getExtraction() const
+  {
+    return result_;
   }
 
   /// What the user should know about the last compute(), one line each.
   const std::vector<std::string>& getNotices() const
   {
-    return notices_;
+    return result_.notices;
   }
 
 protected:
@@ -166,13 +171,6 @@ protected:
   bool deinitCompute() override;
 
 private:
-  /// What one compute() works on.
-  struct Work {
-    RangeCloud cloud;
-    std::optional<PatchExtractor> extractor;
-    std::optional<NeighborhoodSampler> sampler; ///< unless PCL searches
-  };
-
   bool samplesSeeds() const
   {
     return seeds_from_sampler_ && fake_indices_;
@@ -181,9 +179,8 @@ private:
   std::string searchMisuse() const;
   ExtractionOptions effectiveOptions() const;
   RangeCloud rangeCloud();
-  void prepare();
-  std::vector<ExtractedPatch> fitBySearch() const;
-  std::vector<ExtractedPatch> fitBySampler();
+  PatchSites sites() const;
+  void extract();
   void computeFeature(PointCloudOut& output) override;
 
   Sensor sensor_;
@@ -195,9 +192,8 @@ private:
   /// that the base made because the user gave none.
   bool uses_search_ = false;
   bool fake_tree_ = false;
-  std::shared_ptr<const Work> work_; ///< null but during compute()
-  std::vector<ExtractedPatch> results_;
-  std::vector<std::string> notices_;
+  Pose used_sensor_pose_; ///< during compute()
+  ExtractionResult result_; ///< with one entry per seed
 
 public:
   PCL_MAKE_ALIGNED_OPERATOR_NEW

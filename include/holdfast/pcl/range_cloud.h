@@ -23,6 +23,12 @@ struct RangeCloud {
   Covariances covariances;
   /// Where the sensor stood: q_cloud = R q_camera + c, camera frame of sensor/camera.h.
   Pose sensor_pose;
+  /// Where the origin of the points' frame lies in the file's frame, m: coordinates too
+  /// large for float are shifted before they become float.
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();
+  /// The sensor pose was said by the file or by the caller; else it is an assumption,
+  /// which is doubted where the points contradict it.
+  bool sensor_pose_given = false;
 };
 
 /// Empty when the cloud can be worked on, else one sentence: no points object, width *

@@ -23,4 +23,8 @@ struct Sensor {
   double disparity_focal_px = 580.0;
 };
 
+/// The sensor with the same noise for every point in every direction, and a name that
+/// says so: for clouds that the sensor's model does not describe.
+Sensor withConstantNoise(Sensor sensor, double sigma_m);
+
 } // namespace holdfast

@@ -30,6 +30,8 @@ toRangeCloud(const typename pcl::PointCloud<PointT>::ConstPtr& cloud,
   range.sensor_pose = sensorPose(cloud->sensor_origin_, cloud->sensor_orientation_);
   if (validityError(range).empty())
     range.sensor_pose = chooseSensorPose(range.points, range.sensor_pose, notice);
+  // PCL's default is the identity, so that nobody can have said it.
+  range.sensor_pose_given = !isIdentity(range.sensor_pose);
   return range;
 }
 

@@ -15,6 +15,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <utility>
 
 namespace holdfast {
 
@@ -56,8 +57,7 @@ template <typename PointInT, typename PointOutT>
 bool
 PatchEstimation<PointInT, PointOutT>::initCompute()
 {
-  results_.clear();
-  notices_.clear();
+  result_ = {};
   if (!pcl::PCLBase<PointInT>::initCompute())
     return false;
   uses_search_ = tree_ || (surface_ && surface_ != input_);
@@ -70,7 +70,7 @@ PatchEstimation<PointInT, PointOutT>::initCompute()
   }
   if (error.empty()) {
     try {
-      prepare();
+      extract();
       return true;
     }
     catch (const std::exception& exception) {
@@ -91,7 +91,6 @@ PatchEstimation<PointInT, PointOutT>::deinitCompute()
   fake_tree_ = false;
   if (samplesSeeds())
     indices_.reset();
-  work_.reset();
   return pcl::Feature<PointInT, PointOutT>::deinitCompute();
 }
 
@@ -119,46 +118,31 @@ PatchEstimation<PointInT, PointOutT>::rangeCloud()
 {
   std::string notice;
   RangeCloud cloud = toRangeCloud<PointInT>(uses_search_ ? surface_ : input_, &notice);
-  if (sensor_pose_)
+  if (sensor_pose_) {
     cloud.sensor_pose = *sensor_pose_;
+    cloud.sensor_pose_given = true;
+  }
   else if (!notice.empty())
-    notices_.push_back(notice);
+    result_.notices.push_back(notice);
   if (covariances_)
     cloud.covariances = *covariances_;
   return cloud;
 }
 
 template <typename PointInT, typename PointOutT>
-void
-PatchEstimation<PointInT, PointOutT>::prepare()
+PatchSites
+PatchEstimation<PointInT, PointOutT>::sites() const
 {
-  const auto work = std::make_shared<Work>();
-  work->cloud = rangeCloud();
-  const ExtractionOptions options = effectiveOptions();
-  const PatchExtractor& extractor =
-      work->extractor.emplace(work->cloud, sensor_, options);
-  notices_.insert(notices_.end(),
-                  extractor.notices().begin(),
-                  extractor.notices().end());
-  if (!uses_search_)
-    work->sampler.emplace(work->cloud, extractor.sensor(), options.sampler);
-  // As indices, so that it is compute() that gives the output its size: a cloud must
-  // only be resized by code compiled for the instruction set it was allocated by.
-  if (samplesSeeds()) {
-    const std::vector<int> seeds = work->sampler->seeds();
-    indices_ = pcl::make_shared<pcl::Indices>(seeds.begin(), seeds.end());
-  }
-  work_ = work;
-}
-
-template <typename PointInT, typename PointOutT>
-std::vector<ExtractedPatch>
-PatchEstimation<PointInT, PointOutT>::fitBySearch() const
-{
-  std::vector<Seed> seeds;
+  PatchSites sites;
+  if (samplesSeeds())
+    return sites;
+  sites.seeds.emplace();
   for (const int index : *indices_)
-    seeds.push_back({index, (*input_)[index].getVector3fMap().template cast<double>()});
-  const auto search = [this](const Seed& seed, int, std::vector<int>& indices) {
+    sites.seeds->push_back(
+        {index, (*input_)[index].getVector3fMap().template cast<double>()});
+  if (!uses_search_)
+    return sites;
+  sites.search = [this](const Seed& seed, int, std::vector<int>& indices) {
     indices.clear();
     if (!seed.position.allFinite())
       return;
@@ -168,49 +152,46 @@ PatchEstimation<PointInT, PointOutT>::fitBySearch() const
     indices.assign(found.begin(), found.end());
     std::sort(indices.begin(), indices.end());
   };
-  return work_->extractor->fitAround(seeds, search);
+  return sites;
 }
 
 template <typename PointInT, typename PointOutT>
-std::vector<ExtractedPatch>
-PatchEstimation<PointInT, PointOutT>::fitBySampler()
+void
+PatchEstimation<PointInT, PointOutT>::extract()
 {
-  if (samplesSeeds()) {
-    std::string notice;
-    std::vector<ExtractedPatch> results =
-        work_->extractor->fitSampled(*work_->sampler, &notice);
-    if (!notice.empty())
-      notices_.push_back(notice);
-    return results;
-  }
-  return work_->extractor->fitAround(
-      std::vector<int>(indices_->begin(), indices_->end()),
-      *work_->sampler);
+  const RangeCloud cloud = rangeCloud();
+  ExtractionOptions options = effectiveOptions();
+  options.keep_failures = true;
+  // Limits choose among the sampler's seeds; the caller wants a point for each of his.
+  if (!samplesSeeds())
+    options.sampler = withoutLimits(options.sampler);
+  std::vector<std::string> notices = std::move(result_.notices);
+  result_ = extractPatches(cloud, sensor_, options, sites());
+  result_.notices.insert(result_.notices.begin(), notices.begin(), notices.end());
+  used_sensor_pose_ = cloud.sensor_pose;
+  if (!samplesSeeds())
+    return;
+  // As indices, so that it is compute() that gives the output its size: a cloud must
+  // only be resized by code compiled for the instruction set it was allocated by.
+  indices_ = pcl::make_shared<pcl::Indices>();
+  for (const ExtractedPatch& patch : result_.patches)
+    indices_->push_back(*patch.seed_index);
 }
 
 template <typename PointInT, typename PointOutT>
 void
 PatchEstimation<PointInT, PointOutT>::computeFeature(PointCloudOut& output)
 {
-  try {
-    results_ = uses_search_ ? fitBySearch() : fitBySampler();
-  }
-  catch (const std::exception& error) {
-    PCL_ERROR("[holdfast::%s::compute] %s!\n", getClassName().c_str(), error.what());
-    output.clear();
-    return;
-  }
-  // A limit may have left seeds out, and as many seeds as there are pixels would pass
-  // for an image of them.
+  // As many seeds as there are pixels would pass for an image of them.
   if (samplesSeeds()) {
-    output.resize(results_.size());
     output.width = static_cast<std::uint32_t>(output.size());
     output.height = 1;
   }
-  for (std::size_t i = 0; i < results_.size(); ++i)
-    pcl::copyPoint(toPatchPoint(results_[i]), output[i]);
-  output.is_dense = std::all_of(results_.begin(), results_.end(), isAccepted);
-  writeSensorPose(work_->cloud.sensor_pose, output);
+  const std::vector<ExtractedPatch>& patches = result_.patches;
+  for (std::size_t i = 0; i < patches.size(); ++i)
+    pcl::copyPoint(toPatchPoint(patches[i]), output[i]);
+  output.is_dense = std::all_of(patches.begin(), patches.end(), isAccepted);
+  writeSensorPose(used_sensor_pose_, output);
 }
 
 } // namespace holdfast

@@ -1,0 +1,171 @@
+#include "extraction_advice.h"
+
+#include "cloud_measure.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace holdfast {
+namespace {
+
+/// A surface needs this many points at least.
+constexpr std::size_t kFewestPoints = 3;
+
+/// Seeds that are tried first: few against all, and enough that a cloud in which one in
+/// ten seeds has neighbours is stopped once in a thousand times only.
+constexpr std::size_t kProbes = 64;
+constexpr std::size_t kWorthProbing = 8 * kProbes;
+
+/// The unit in which the cloud would be like those of depth cameras: of the size of a
+/// room, with points some millimetres apart; empty when it is so already.
+std::string
+likelyUnit(const CloudMeasure& measure)
+{
+  struct Unit {
+    double scale;
+    const char* option;
+  };
+  constexpr std::array<Unit, 3> kUnits{{{1e-3, "mm"}, {1e-2, "cm"}, {1e-6, "um"}}};
+  const auto plausible = [&measure](double scale) {
+    const double spacing = scale * measure.spacing_m;
+    const double extent = scale * measure.extent();
+    return spacing >= 2e-4 && spacing <= 0.03 && extent >= 0.05 && extent <= 30.0;
+  };
+  if (plausible(1.0))
+    return {};
+  for (const Unit& unit : kUnits)
+    if (plausible(unit.scale))
+      return unit.option;
+  return {};
+}
+
+std::string
+meters(double length)
+{
+  return shortNumber(length) + " m";
+}
+
+/// What is wrong with neighbourhoods of this radius in this cloud; empty if nothing is.
+std::string
+radiusAdvice(const CloudMeasure& measure, double radius_m)
+{
+  const std::string unit = likelyUnit(measure);
+  if (!unit.empty())
+    return "are the coordinates not metres? --unit " + unit + " scales them";
+  if (radius_m >= measure.extent())
+    return "the radius of " + meters(radius_m) + " is larger than the cloud";
+  // A disc of two spacings holds a dozen points.
+  if (!(radius_m >= 2.0 * measure.spacing_m))
+    return "the radius of " + meters(radius_m) +
+           " is too small for points so far apart, or the unit is not the metre "
+           "(--unit)";
+  return {};
+}
+
+/// Every n-th seed, kProbes of them.
+std::vector<Seed>
+probesAmong(const std::vector<Seed>& seeds)
+{
+  std::vector<Seed> probes;
+  for (std::size_t i = 0; i < kProbes; ++i)
+    probes.push_back(seeds[i * seeds.size() / kProbes]);
+  return probes;
+}
+
+CloudMeasure
+measured(const PointSelection& chosen)
+{
+  return measureCloud(*chosen.cloud.points, chosen.cloud.sensor_pose.c);
+}
+
+} // namespace
+
+std::string
+fallbackNotice(const NeighborhoodSampler& sampler, const RangeCloud& cloud)
+{
+  if (sampler.options().neighborhood != Neighborhood::Disc || sampler.usesPixels())
+    return {};
+  if (cloud.points->height < 2)
+    return "not organized: balls take the place of discs";
+  return "organized, but rows and columns are not the pixels of a camera at the "
+         "sensor's pose (mirrored, turned, or scanned all round?): balls take the "
+         "place "
+         "of discs";
+}
+
+std::string
+viewpointNotice(const RangeCloud& cloud)
+{
+  const Eigen::Vector3d& c = cloud.sensor_pose.c;
+  return "it is not known where the cloud was taken from, and the points do not look "
+         "as "
+         "if it were " +
+         shortNumber(c.x()) + " " + shortNumber(c.y()) + " " + shortNumber(c.z()) +
+         ": normals may be on the wrong side (bumps come out as bowls); --viewpoint X "
+         "Y "
+         "Z or --orient outward|up tells the side";
+}
+
+void
+keepPromisingSeeds(const PointSelection& chosen,
+                   const SamplerOptions& sampler,
+                   const NeighborhoodSearch& search,
+                   std::vector<Seed>& seeds,
+                   std::vector<std::string>& notices)
+{
+  if (seeds.size() < kWorthProbing || sampler.neighborhood == Neighborhood::Knn)
+    return;
+  const std::vector<Seed> probes = probesAmong(seeds);
+  const auto whole = static_cast<std::size_t>(chosen.points.used);
+  std::size_t with_neighbors = 0;
+  std::size_t with_all = 0;
+  std::vector<int> indices;
+  for (const Seed& seed : probes) {
+    search(seed, 0, indices);
+    with_neighbors += indices.size() >= kFewestPoints;
+    with_all += indices.size() == whole;
+  }
+  const std::string others =
+      "the other " + std::to_string(seeds.size() - probes.size()) + " are not tried: ";
+  if (with_neighbors <= 1) {
+    const CloudMeasure measure = measured(chosen);
+    const std::string advice = radiusAdvice(measure, sampler.radius_m);
+    notices.push_back(std::to_string(with_neighbors) + " of " +
+                      std::to_string(probes.size()) + " seeds have neighbours, " +
+                      others + describe(measure) +
+                      (advice.empty() ? "" : ": " + advice));
+    seeds = probes;
+  }
+  else if (with_all == probes.size()) {
+    notices.push_back(
+        "each neighbourhood is the whole cloud, so only one seed is tried: "
+        "the radius of " +
+        meters(sampler.radius_m) + " is larger than the cloud, " +
+        describe(measured(chosen)));
+    seeds = {probes[probes.size() / 2]};
+  }
+}
+
+void
+adviseOnNoPatches(const PointSelection& chosen,
+                  const SamplerOptions& sampler,
+                  ExtractionResult& result)
+{
+  if (std::any_of(result.patches.begin(), result.patches.end(), isAccepted))
+    return;
+  if (chosen.points.used == 0) {
+    result.notices.push_back("no patch, since no point can be used: " +
+                             std::to_string(chosen.points.invalid) + " of " +
+                             std::to_string(chosen.points.in_cloud) + " are invalid");
+    return;
+  }
+  const CloudMeasure measure = measured(chosen);
+  const std::string advice = sampler.neighborhood == Neighborhood::Knn ?
+                                 std::string() :
+                                 radiusAdvice(measure, sampler.radius_m);
+  result.notices.push_back("no patch: " + describe(measure) +
+                           (advice.empty() ? "" : ": " + advice));
+}
+
+} // namespace holdfast

@@ -1,0 +1,134 @@
+#include "point_selection.h"
+
+#include "unused_points.h"
+#include "view_check.h"
+
+#include <holdfast/geometry/gaussian.h>
+#include <holdfast/pcl/intrinsics.h>
+#include <holdfast/sensor/constant_noise_model.h>
+
+#include <pcl/common/point_tests.h>
+
+#include <algorithm>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace holdfast {
+namespace {
+
+/// Standard deviation assumed where the sensor's model cannot hold, m.
+constexpr double kUnknownSigma = 1e-3;
+
+void
+requireUsable(const RangeCloud& cloud, const Sensor& sensor)
+{
+  if (const std::string error = validityError(cloud); !error.empty())
+    throw std::invalid_argument(error);
+  if (!sensor.noise && cloud.covariances.empty())
+    throw std::invalid_argument(
+        "the cloud has no covariances, and the sensor no noise model");
+}
+
+/// Most matrices are positive definite, which three minors show; the eigenvalues decide
+/// the rest.
+bool
+isCovariance(const Eigen::Matrix3d& S)
+{
+  if (!S.allFinite())
+    return false;
+  const double minor = S(0, 0) * S(1, 1) - S(0, 1) * S(1, 0);
+  return (S(0, 0) > 0.0 && minor > 0.0 && S.determinant() > 0.0 &&
+          S.isApprox(S.transpose())) ||
+         isPositiveSemiDefinite(S);
+}
+
+void
+dropInvalidCovariances(const RangeCloud& cloud, UnusedPoints& unused)
+{
+  for (std::size_t i = 0; i < cloud.covariances.size(); ++i)
+    if (!isCovariance(cloud.covariances[i].cast<double>()))
+      unused.drop(i, &PointAccounting::invalid_covariance);
+}
+
+/// The pixels of an image are seen along different rays, so none repeats another.
+bool
+isImage(const RangeCloud& cloud, const Sensor& sensor)
+{
+  constexpr double kMaxResidualPx = 2.0;
+  if (cloud.points->height < 2)
+    return false;
+  const auto residual = pixelResidual(cloud, sensor.camera);
+  return (residual && *residual <= kMaxResidualPx) || recoverIntrinsics(cloud);
+}
+
+void
+noteDuplicates(PointSelection& selection)
+{
+  const PointAccounting& points = selection.points;
+  if (points.duplicate == 0)
+    return;
+  const int distinct = points.used + points.duplicate;
+  selection.notices.push_back(
+      std::to_string(points.duplicate) + " of " + std::to_string(distinct) +
+      " points (" + std::to_string(100LL * points.duplicate / distinct) +
+      " %) lie exactly where others do: each place counts once");
+}
+
+} // namespace
+
+PointSelection
+selectPoints(const RangeCloud& cloud, const Sensor& nominal)
+{
+  requireUsable(cloud, nominal);
+  PointSelection selection;
+  selection.sensor =
+      nominal.noise ? nominal : withConstantNoise(nominal, kUnknownSigma);
+  const bool model_asked =
+      cloud.covariances.empty() && nominal.noise && !nominal.noise->isOmnidirectional();
+  const ViewCheck view(cloud, selection.sensor);
+  UnusedPoints unused(cloud);
+  if (model_asked && view.isForeign()) {
+    selection.notices.push_back(view.foreignNotice());
+    selection.sensor = withConstantNoise(nominal, kUnknownSigma);
+  }
+  else if (model_asked) {
+    view.dropUnseen(unused);
+    if (const std::string hint = view.hint(); !hint.empty())
+      selection.notices.push_back(hint);
+  }
+  dropInvalidCovariances(cloud, unused);
+  if (!isImage(cloud, nominal))
+    unused.dropDuplicates();
+  selection.viewpoint_is_credible =
+      cloud.sensor_pose_given || !(model_asked ? view.isForeign() : view.isAllAround());
+  selection.cloud = unused.usedCloud();
+  selection.points = unused.accounting();
+  noteDuplicates(selection);
+  if (const std::string text = leftOutText(selection.points); !text.empty())
+    selection.notices.push_back(text);
+  return selection;
+}
+
+std::string
+leftOutText(const PointAccounting& points)
+{
+  const int left_out = points.valid() - points.used;
+  if (left_out == 0)
+    return {};
+  std::string reasons;
+  const auto add = [&reasons](int count, const char* reason) {
+    if (count > 0)
+      reasons += (reasons.empty() ? "" : ", ") + std::to_string(count) + " " + reason;
+  };
+  add(points.behind_camera, "behind the camera");
+  add(points.out_of_view, "out of the sensor's view or range");
+  add(points.invalid_covariance, "with a covariance that is none");
+  add(points.duplicate, "duplicates");
+  return std::to_string(left_out) + " of " + std::to_string(points.valid()) +
+         " points are left out: " + reasons;
+}
+
+} // namespace holdfast

@@ -1,0 +1,24 @@
+#include <holdfast/sensor/sensor.h>
+
+#include <holdfast/sensor/constant_noise_model.h>
+
+#include <locale>
+#include <memory>
+#include <sstream>
+#include <utility>
+
+namespace holdfast {
+
+Sensor
+withConstantNoise(Sensor sensor, double sigma_m)
+{
+  std::ostringstream name;
+  name.imbue(std::locale::classic());
+  name << "constant noise of " << 1e3 * sigma_m << " mm";
+  sensor.name = name.str();
+  sensor.noise = std::make_shared<const ConstantNoiseModel>(
+      ConstantNoiseModel::Parameters{sigma_m, sigma_m});
+  return sensor;
+}
+
+} // namespace holdfast
