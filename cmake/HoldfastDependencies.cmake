@@ -3,6 +3,7 @@
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
 find_package(Boost 1.74 REQUIRED) # Boost.Math, headers only
 find_package(Threads REQUIRED)
+find_package(fmt 8 REQUIRED)
 find_package(nlohmann_json 3.10 REQUIRED)
 find_package(PNG REQUIRED)
 find_package(yaml-cpp REQUIRED)
