@@ -1,4 +1,5 @@
 #include "cloud_readers.h"
+#include "pcl/zero_points.h"
 
 #include <holdfast/geometry/gaussian.h>
 #include <holdfast/io/atomic_file.h>
@@ -13,11 +14,12 @@
 #include <cctype>
 #include <cerrno>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <iostream>
 #include <new>
-#include <sstream>
+
+#include <fmt/format.h>
 
 namespace holdfast {
 namespace {
@@ -53,109 +55,135 @@ formatOfExtension(const std::string& path)
                                Format::Unknown;
 }
 
+/// True when the first line is "ply", with blanks behind it or not.
+bool
+isPly(std::string_view text)
+{
+  return startsWith(text, "ply") && text.size() > 3 &&
+         std::string_view(" \t\r\n").find(text[3]) != std::string_view::npos;
+}
+
 Format
 detectFormat(std::string_view bytes, const std::string& path)
 {
   if (startsWith(bytes, kPngSignature))
     return Format::Png;
-  if (startsWith(bytes, "ply\n") || startsWith(bytes, "ply\r\n"))
-    return Format::Ply;
-  if (startsWith(bytes, "# .PCD") || startsWith(bytes, "VERSION"))
-    return Format::Pcd;
-  if (startsWith(bytes, "P5"))
+  if (startsWith(bytes, "P5") || startsWith(bytes, "P2"))
     return Format::Pgm;
+  const std::string_view text = io::skipToText(bytes);
+  if (isPly(text))
+    return Format::Ply;
+  for (const std::string_view start :
+       {"# .PCD", "VERSION ", "VERSION\t", "FIELDS ", "COLUMNS "})
+    if (startsWith(text, start))
+      return Format::Pcd;
   return formatOfExtension(path);
 }
 
-std::string
-readBytes(const std::string& path)
+/// What a file is that is often found where a cloud is expected.
+std::optional<std::string_view>
+nameOfStranger(std::string_view bytes)
 {
-  std::error_code error;
-  const auto status = std::filesystem::status(path, error);
-  if (status.type() == std::filesystem::file_type::not_found)
-    throw std::runtime_error("no such file");
-  if (status.type() == std::filesystem::file_type::directory)
-    throw std::runtime_error("is a directory, not a cloud");
-  if (status.type() != std::filesystem::file_type::regular)
-    throw std::runtime_error("is no regular file");
-  std::ifstream file(path, std::ios::binary);
-  if (!file)
-    throw std::runtime_error("cannot be opened: " + std::string(std::strerror(errno)));
+  using namespace std::string_view_literals;
+  struct Stranger {
+    std::string_view start, name;
+  };
+  constexpr std::string_view kPage = "a web page, not the file itself";
+  static constexpr Stranger kStrangers[]{
+      {"version https://git-lfs"sv, "a Git LFS pointer, not the file itself"},
+      {"/annex/objects/"sv, "a git-annex pointer, not the file itself"},
+      {"../.git/annex/"sv, "a git-annex pointer, not the file itself"},
+      {"\x1f\x8b"sv, "packed by gzip: unpack it first"},
+      {"PK\x03\x04"sv, "packed by zip: unpack it first"},
+      {"BZh"sv, "packed by bzip2: unpack it first"},
+      {"\xfd\x37zXZ"sv, "packed by xz: unpack it first"},
+      {"\x28\xb5\x2f\xfd"sv, "packed by zstd: unpack it first"},
+      {"7z\xbc\xaf"sv, "packed by 7-zip: unpack it first"},
+      {"\xff\xfe"sv, "text in UTF-16: save it as UTF-8"},
+      {"\xfe\xff"sv, "text in UTF-16: save it as UTF-8"},
+      {"\xff\xd8\xff"sv, "a JPEG image, not a cloud"},
+      {"LASF"sv, "a LAS or LAZ file: convert it to PCD or PLY"},
+      {"ASTM-E57"sv, "an E57 file: convert it to PCD or PLY"},
+      {"#ROSBAG"sv, "a ROS bag: save a cloud of it as PCD"},
+      {"PCLZF"sv, "a PCLZF image: convert it to PNG"},
+  };
+  for (const Stranger& stranger : kStrangers)
+    if (startsWith(bytes, stranger.start))
+      return stranger.name;
+  std::string start(io::skipToText(bytes).substr(0, 16));
+  for (char& c : start)
+    c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (startsWith(start, "<!doctype html") || startsWith(start, "<html") ||
+      startsWith(start, "<head"))
+    return kPage;
+  if (startsWith(start, "<?xml"))
+    return "XML, not a cloud";
+  return std::nullopt;
+}
+
+/// Standard input, a pipe: what has no size beforehand.
+std::string
+readStream(std::istream& stream)
+{
+  constexpr std::size_t kBlock = 1U << 20U;
+  constexpr std::size_t kLimit = std::size_t{8} << 30U;
+  std::string bytes;
+  while (stream) {
+    const std::size_t before = bytes.size();
+    if (before > kLimit)
+      throw std::runtime_error("more than 8 GiB do not come to an end");
+    bytes.resize(before + kBlock);
+    stream.read(&bytes[before], static_cast<std::streamsize>(kBlock));
+    bytes.resize(before + static_cast<std::size_t>(stream.gcount()));
+  }
+  return bytes;
+}
+
+std::string
+readRegular(const std::string& path, std::istream& file)
+{
   std::string bytes(std::filesystem::file_size(path), '\0');
-  if (bytes.empty())
-    throw std::runtime_error("is empty");
   file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   if (file.gcount() != static_cast<std::streamsize>(bytes.size()))
     throw std::runtime_error("could not be read completely");
   return bytes;
 }
 
-/// The camera for an image of another size but the same aspect ratio.
-Camera
-scaledCamera(const Camera& camera, int width, int height)
+std::string
+readBytes(const std::string& path)
 {
-  if (static_cast<std::int64_t>(width) * camera.height !=
-      static_cast<std::int64_t>(height) * camera.width)
-    throw std::runtime_error(
-        "an image of " + std::to_string(width) + " x " + std::to_string(height) +
-        " pixels is not from a camera of " + std::to_string(camera.width) + " x " +
-        std::to_string(camera.height));
-  const double scale = static_cast<double>(width) / camera.width;
-  Camera scaled;
-  scaled.width = width;
-  scaled.height = height;
-  scaled.fx = scale * camera.fx;
-  scaled.fy = scale * camera.fy;
-  // Pixel coordinates are 0 at the centre of the first pixel, -0.5 at its edge.
-  scaled.cx = scale * (camera.cx + 0.5) - 0.5;
-  scaled.cy = scale * (camera.cy + 0.5) - 0.5;
-  return scaled;
+  namespace fs = std::filesystem;
+  std::string bytes;
+  if (path == "-") {
+    bytes = readStream(std::cin);
+  }
+  else {
+    std::error_code error;
+    const fs::file_type type = fs::status(path, error).type();
+    if (type == fs::file_type::not_found)
+      throw std::runtime_error("no such file");
+    if (type == fs::file_type::directory)
+      throw std::runtime_error("is a directory, not a cloud");
+    if (type != fs::file_type::regular && type != fs::file_type::fifo)
+      throw std::runtime_error("is not a regular file");
+    std::ifstream file(path, std::ios::binary);
+    if (!file)
+      throw std::runtime_error("cannot be opened: " +
+                               std::string(std::strerror(errno)));
+    bytes = type == fs::file_type::fifo ? readStream(file) : readRegular(path, file);
+  }
+  if (bytes.empty())
+    throw std::runtime_error("is empty");
+  return bytes;
 }
 
-void
-checkDepthRange(const io::DepthImage& image, const LoadOptions& options)
-{
-  const auto in_range = [&](std::uint16_t units) {
-    const double depth = units / options.depth_scale;
-    return units != 0 && depth >= options.min_range_m && depth <= options.max_range_m;
-  };
-  const auto measured = [](std::uint16_t units) { return units != 0; };
-  if (std::none_of(image.pixels.begin(), image.pixels.end(), measured))
-    throw std::runtime_error("has no valid point");
-  if (std::none_of(image.pixels.begin(), image.pixels.end(), in_range))
-    throw std::runtime_error("no depth is within the range of the sensor: is the depth "
-                             "scale right?");
-}
-
-/// Back-projects the pixels; the cloud is in the camera frame.
 io::RawCloud
-backProject(const io::DepthImage& image,
-            const LoadOptions& options,
-            const std::string& format)
+readDepthImage(io::DepthImage image,
+               const LoadOptions& options,
+               const std::string& format)
 {
-  if (image.pixels.empty())
-    throw std::runtime_error("has no pixels");
-  checkDepthRange(image, options);
-  const Camera camera = scaledCamera(options.camera, image.width, image.height);
-  io::RawCloud cloud;
+  io::RawCloud cloud = io::backProject(image, options);
   cloud.info.format = format;
-  cloud.info.fields = {"depth"};
-  if (camera.width != options.camera.width)
-    cloud.info.notices.push_back("intrinsics scaled from " +
-                                 std::to_string(options.camera.width) + " to " +
-                                 std::to_string(camera.width) + " pixels of width");
-  const float nan = std::numeric_limits<float>::quiet_NaN();
-  cloud.points->reserve(image.pixels.size());
-  for (int v = 0; v < image.height; ++v)
-    for (int u = 0; u < image.width; ++u) {
-      const std::size_t i = cloud.points->size();
-      const double depth = image.pixels[i] / options.depth_scale;
-      const Eigen::Vector3f q = camera.backProject(u, v, depth).cast<float>();
-      cloud.points->push_back(depth > 0.0 ? pcl::PointXYZ(q.x(), q.y(), q.z()) :
-                                            pcl::PointXYZ(nan, nan, nan));
-    }
-  cloud.points->width = static_cast<std::uint32_t>(image.width);
-  cloud.points->height = static_cast<std::uint32_t>(image.height);
   return cloud;
 }
 
@@ -163,15 +191,17 @@ io::RawCloud
 readAny(const std::string& path, const LoadOptions& options)
 {
   const std::string bytes = readBytes(path);
+  if (const auto name = nameOfStranger(bytes))
+    throw std::runtime_error("is " + std::string(*name));
   switch (detectFormat(bytes, path)) {
   case Format::Pcd:
-    return io::readPcd(bytes);
+    return io::readPcd(bytes, options);
   case Format::Ply:
-    return io::readPly(bytes);
+    return io::readPly(bytes, options);
   case Format::Png:
-    return backProject(io::readPng(bytes), options, "PNG depth");
+    return readDepthImage(io::readPng(bytes, options.max_points), options, "PNG depth");
   case Format::Pgm:
-    return backProject(io::readPgm(bytes), options, "PGM depth");
+    return readDepthImage(io::readPgm(bytes, options.max_points), options, "PGM depth");
   case Format::Unknown:
     break;
   }
@@ -187,78 +217,272 @@ noteCoarseCoordinates(io::RawCloud& cloud)
     if (pcl::isFinite(point))
       largest = std::max(largest, point.getArray3fMap().abs().maxCoeff());
   const double step_m = std::ldexp(largest, -23);
-  if (step_m < 1e-4)
+  if (step_m >= 1e-4)
+    cloud.info.notices.push_back(
+        fmt::format("coordinates up to {:.0f} m are only kept to {:.1g} m: move the "
+                    "cloud towards the origin",
+                    largest,
+                    step_m));
+}
+
+void
+noteOffset(io::RawCloud& raw)
+{
+  const Eigen::Vector3d& o = raw.offset;
+  if (!o.isZero(0.0))
+    raw.info.notices.push_back(
+        fmt::format("coordinates shifted by {} {} {} m on the way to single precision",
+                    -o.x(),
+                    -o.y(),
+                    -o.z()));
+}
+
+/// Points are finite or NaN.
+void
+invalidateNotFinite(pcl::PointCloud<pcl::PointXYZ>& points)
+{
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  for (auto& point : points)
+    if (!pcl::isFinite(point))
+      point.getVector3fMap().setConstant(nan);
+}
+
+/// PCL writes 0 0 0 1 0 0 0 for clouds that know of no viewpoint.
+void
+dropDefaultViewpoint(CloudFileInfo& info)
+{
+  if (info.viewpoint && info.viewpoint->c.isZero(0.0) &&
+      info.viewpoint->R.isIdentity(1e-9))
+    info.viewpoint.reset();
+}
+
+/// The sensor's orientation when only its position is known: the file's, else that of
+/// the axes, else towards the middle of the points.
+Eigen::Matrix3d
+orientationAt(const Eigen::Vector3d& position,
+              const io::RawCloud& raw,
+              const LoadOptions& options)
+{
+  const Eigen::Matrix3d turn = turnFromCamera(raw.info.axes);
+  if (raw.info.viewpoint)
+    return raw.info.viewpoint->R * turn;
+  if (options.axes)
+    return turn;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  int n = 0;
+  for (const auto& point : *raw.points)
+    if (pcl::isFinite(point)) {
+      sum += point.getVector3fMap().cast<double>();
+      ++n;
+    }
+  const Eigen::Vector3d forward = sum / n - position;
+  if (forward.norm() < 1e-9)
+    return turn;
+  return Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), forward)
+      .toRotationMatrix();
+}
+
+/// The sensor pose in the frame of the points, which lies at the offset.
+Pose
+sensorPoseOf(io::RawCloud& raw, const LoadOptions& options)
+{
+  const Eigen::Matrix3d turn = turnFromCamera(raw.info.axes);
+  if (options.viewpoint) {
+    const Eigen::Vector3d position = *options.viewpoint - raw.offset;
+    return {orientationAt(position, raw, options), position};
+  }
+  const std::optional<Pose>& known =
+      options.sensor_pose ? options.sensor_pose : raw.info.viewpoint;
+  Pose pose; // of a file without viewpoint: the origin of the points
+  if (known)
+    pose = {known->R * turn, known->c - raw.offset};
+  else
+    pose.R = turn;
+  if (options.sensor_pose || options.axes)
+    return pose;
+  std::string notice;
+  pose = chooseSensorPose(raw.points, pose, &notice);
+  if (!notice.empty())
+    raw.info.notices.push_back(notice);
+  return pose;
+}
+
+void
+noteZeroPoints(CloudFileInfo& info)
+{
+  if (info.zero_points == 1)
+    info.notices.emplace_back("1 point at the sensor is taken as invalid");
+  else if (info.zero_points > 1)
+    info.notices.push_back(
+        fmt::format("{} points at the sensor are taken as invalid", info.zero_points));
+}
+
+/// The camera that the caller gave for a cloud.
+void
+applyCamera(const LoadOptions& options, io::RawCloud& raw)
+{
+  if (raw.info.is_depth_image || !options.camera_given)
     return;
-  char line[120];
-  std::snprintf(line,
-                sizeof(line),
-                "coordinates up to %.0f m are only kept to %.1g m: move the cloud "
-                "towards the origin",
-                static_cast<double>(largest),
-                step_m);
-  cloud.info.notices.emplace_back(line);
+  raw.info.camera = options.camera;
+  if (raw.points->height > 1) {
+    raw.info.camera->width = static_cast<int>(raw.points->width);
+    raw.info.camera->height = static_cast<int>(raw.points->height);
+  }
 }
 
 RangeCloud
-finish(io::RawCloud& raw)
+finish(io::RawCloud& raw, const LoadOptions& options)
 {
   auto& points = *raw.points;
+  CloudFileInfo& info = raw.info;
+  info.axes = options.axes.value_or(CloudAxes::Camera);
+  invalidateNotFinite(points);
+  dropDefaultViewpoint(info);
+  applyCamera(options, raw);
+  // Zeros are in nobody's view: out before the view is judged.
+  info.zero_points += invalidateZeroPoints(points, info.viewpoint.value_or(Pose()));
   RangeCloud cloud;
   cloud.points = raw.points;
+  cloud.offset = raw.offset;
+  if (countValidPoints(cloud) == 0)
+    throw std::runtime_error("has no valid point");
+  cloud.sensor_pose = sensorPoseOf(raw, options);
+  info.zero_points += invalidateZeroPoints(points, cloud.sensor_pose);
   cloud.covariances = std::move(raw.covariances);
   const int valid = countValidPoints(cloud);
   if (valid == 0)
     throw std::runtime_error("has no valid point");
   points.is_dense = static_cast<std::size_t>(valid) == points.size();
-  std::string notice;
-  cloud.sensor_pose =
-      chooseSensorPose(cloud.points, raw.info.viewpoint.value_or(Pose()), &notice);
-  if (!notice.empty())
-    raw.info.notices.push_back(notice);
+  noteZeroPoints(info);
+  noteOffset(raw);
   noteCoarseCoordinates(raw);
   return cloud;
+}
+
+bool
+isFinite(const std::optional<Pose>& pose)
+{
+  return !pose || (pose->c.allFinite() && pose->R.allFinite());
+}
+
+void
+checkOptions(const LoadOptions& options)
+{
+  if (!(options.depth_scale > 0.0) || !std::isfinite(options.depth_scale))
+    throw std::invalid_argument("the depth scale must be a positive number");
+  if (!(options.unit_m > 0.0) || !std::isfinite(options.unit_m))
+    throw std::invalid_argument("the unit must be a positive number");
+  if (options.sensor_pose && options.viewpoint)
+    throw std::invalid_argument("a sensor pose and a viewpoint are given");
+  if (!isFinite(options.sensor_pose) ||
+      !options.viewpoint.value_or(Eigen::Vector3d::Zero()).allFinite())
+    throw std::invalid_argument("the sensor pose is not finite");
+}
+
+/// Coordinates of a cloud with an offset need double precision.
+bool
+isWide(const RangeCloud& cloud)
+{
+  return !cloud.offset.isZero(0.0);
 }
 
 std::string
 pcdHeader(const RangeCloud& cloud, bool ascii)
 {
   const bool has_covariances = !cloud.covariances.empty();
-  const Eigen::Vector3d& c = cloud.sensor_pose.c;
+  const Eigen::Vector3d c = cloud.sensor_pose.c + cloud.offset;
   const Eigen::Quaterniond q(cloud.sensor_pose.R);
-  std::ostringstream header;
-  header.precision(9);
-  header << "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\n"
-         << (has_covariances ? "FIELDS x y z covariance\nSIZE 4 4 4 4\nTYPE F F F F\n"
-                               "COUNT 1 1 1 6\n" :
-                               "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n")
-         << "WIDTH " << cloud.points->width << "\nHEIGHT " << cloud.points->height
-         << "\nVIEWPOINT " << c.x() << ' ' << c.y() << ' ' << c.z() << ' ' << q.w()
-         << ' ' << q.x() << ' ' << q.y() << ' ' << q.z() << "\nPOINTS "
-         << cloud.points->size() << "\nDATA " << (ascii ? "ascii\n" : "binary\n");
-  return header.str();
+  const int size = isWide(cloud) ? 8 : 4;
+  std::string header =
+      fmt::format("# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\n"
+                  "FIELDS x y z{}\nSIZE {} {} {}{}\nTYPE F F F{}\nCOUNT 1 1 1{}\n",
+                  has_covariances ? " covariance" : "",
+                  size,
+                  size,
+                  size,
+                  has_covariances ? " 4" : "",
+                  has_covariances ? " F" : "",
+                  has_covariances ? " 6" : "");
+  header += fmt::format("WIDTH {}\nHEIGHT {}\nVIEWPOINT {} {} {} {} {} {} {}\n"
+                        "POINTS {}\nDATA {}\n",
+                        cloud.points->width,
+                        cloud.points->height,
+                        c.x(),
+                        c.y(),
+                        c.z(),
+                        q.w(),
+                        q.x(),
+                        q.y(),
+                        q.z(),
+                        cloud.points->size(),
+                        ascii ? "ascii" : "binary");
+  return header;
+}
+
+/// A value of a row as text or in bytes.
+template <typename T>
+void
+append(T value, bool ascii, std::string& row)
+{
+  if (ascii)
+    fmt::format_to(std::back_inserter(row), "{}{}", row.empty() ? "" : " ", value);
+  else
+    row.append(reinterpret_cast<const char*>(&value), sizeof(T));
 }
 
 /// x y z, then xx xy xz yy yz zz when there are covariances.
-std::vector<float>
-pcdRow(const RangeCloud& cloud, std::size_t i)
+std::string
+pcdRow(const RangeCloud& cloud, std::size_t i, bool ascii)
 {
+  std::string row;
   const pcl::PointXYZ& p = (*cloud.points)[i];
-  if (cloud.covariances.empty())
-    return {p.x, p.y, p.z};
-  const Eigen::Matrix3f& s = cloud.covariances[i];
-  return {p.x, p.y, p.z, s(0, 0), s(0, 1), s(0, 2), s(1, 1), s(1, 2), s(2, 2)};
+  for (int k = 0; k < 3; ++k) {
+    if (isWide(cloud))
+      append(static_cast<double>(p.data[k]) + cloud.offset[k], ascii, row);
+    else
+      append(p.data[k], ascii, row);
+  }
+  if (!cloud.covariances.empty()) {
+    const Eigen::Matrix3f& s = cloud.covariances[i];
+    for (int r = 0; r < 3; ++r)
+      for (int c = r; c < 3; ++c)
+        append(s(r, c), ascii, row);
+  }
+  if (ascii)
+    row += '\n';
+  return row;
 }
 
 } // namespace
 
+void
+io::checkPointCount(std::uint64_t points, std::uint64_t max_points)
+{
+  if (points > max_points)
+    throw std::runtime_error(
+        fmt::format("announces {} points, more than --max-points {} allows",
+                    points,
+                    max_points));
+}
+
+Eigen::Matrix3d
+turnFromCamera(CloudAxes axes)
+{
+  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
+  if (axes == CloudAxes::OpenGl)
+    turn.diagonal() << 1.0, -1.0, -1.0;
+  else if (axes == CloudAxes::Ros)
+    turn << 0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0;
+  return turn;
+}
+
 RangeCloud
 loadCloud(const std::string& path, const LoadOptions& options, CloudFileInfo* info)
 {
-  if (!(options.depth_scale > 0.0) || !std::isfinite(options.depth_scale))
-    throw std::invalid_argument("the depth scale must be a positive number");
+  checkOptions(options);
   try {
     io::RawCloud raw = readAny(path, options);
-    RangeCloud cloud = finish(raw);
+    RangeCloud cloud = finish(raw, options);
     if (info != nullptr)
       *info = std::move(raw.info);
     return cloud;
@@ -279,18 +503,8 @@ saveCloud(const std::string& path, const RangeCloud& cloud, bool ascii)
   AtomicFile file(path);
   std::ostream& out = file.stream();
   out << pcdHeader(cloud, ascii);
-  out.precision(9);
-  for (std::size_t i = 0; i < cloud.points->size(); ++i) {
-    const std::vector<float> row = pcdRow(cloud, i);
-    if (!ascii) {
-      out.write(reinterpret_cast<const char*>(row.data()),
-                static_cast<std::streamsize>(row.size() * sizeof(float)));
-      continue;
-    }
-    for (std::size_t k = 0; k < row.size(); ++k)
-      out << (k == 0 ? "" : " ") << row[k];
-    out << '\n';
-  }
+  for (std::size_t i = 0; i < cloud.points->size(); ++i)
+    out << pcdRow(cloud, i, ascii);
   file.commit();
 }
 

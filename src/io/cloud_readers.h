@@ -17,10 +17,11 @@
 
 namespace holdfast::io {
 
-/// A cloud as the file has it, before any judgement.
+/// A cloud as the file has it, before any judgement; points and covariances in m.
 struct RawCloud {
   pcl::PointCloud<pcl::PointXYZ>::Ptr points{new pcl::PointCloud<pcl::PointXYZ>};
   std::vector<Eigen::Matrix3f> covariances;
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero(); ///< of RangeCloud
   CloudFileInfo info;
 };
 
@@ -29,22 +30,50 @@ struct DepthImage {
   int width = 0;
   int height = 0;
   std::vector<std::uint16_t> pixels;
+  std::vector<std::string> notices;
 };
 
-RawCloud readPcd(std::string_view bytes);
-RawCloud readPly(std::string_view bytes);
-DepthImage readPng(std::string_view bytes);
-DepthImage readPgm(std::string_view bytes);
+RawCloud readPcd(std::string_view bytes, const LoadOptions& options);
+RawCloud readPly(std::string_view bytes, const LoadOptions& options);
+DepthImage readPng(std::string_view bytes, std::uint64_t max_points);
+DepthImage readPgm(std::string_view bytes, std::uint64_t max_points);
+
+/// Back-projects the pixels; the cloud is in the camera frame.
+/// \throw std::runtime_error when the pixels cannot be depths.
+RawCloud backProject(DepthImage& image, const LoadOptions& options);
+
+/// \throw std::runtime_error when there are more points than allowed.
+void checkPointCount(std::uint64_t points, std::uint64_t max_points);
+
+/// Where coordinates that float would round by more than 10 um come from, in whole
+/// metres near their middle; zero when float is good enough. `xyz`: three per point, m.
+Eigen::Vector3d offsetOf(const std::vector<double>& xyz);
+
+/// Makes the points of the cloud from coordinates in m, shifted when they are too large
+/// for float.
+void placePoints(const std::vector<double>& xyz, RawCloud& cloud);
+
+/// Text of a file as it may be shown: one line of printable characters.
+std::string printable(std::string_view text);
+
+/// Without a byte order mark and the blank lines before the first word.
+std::string_view skipToText(std::string_view bytes);
+
+/// The character that ends the lines of a text: '\r' when its first line ends with that
+/// alone, else '\n', with or without a '\r' before it.
+char lineEnd(std::string_view text);
 
 /// Takes the next line off `text`, without its line end; nothing at the end.
-std::optional<std::string_view> takeLine(std::string_view& text);
+std::optional<std::string_view> takeLine(std::string_view& text, char line_end = '\n');
 
 /// Takes the next word off `text`; empty at the end.
 std::string_view takeWord(std::string_view& text);
 
 std::vector<std::string_view> splitWords(std::string_view line);
 
-/// The whole word as a number ("nan" and "inf" included), or nothing.
+/// The whole word as a number, or nothing. What is too small for double is 0, what is
+/// too large infinite; "nan" and "inf" are numbers however they are spelled
+/// ("1.#QNAN").
 std::optional<double> parseNumber(std::string_view word);
 
 /// The whole word as a non-negative integer, or nothing.

@@ -1,3 +1,16 @@
+/// PCD files, by a reader of our own, since clouds come from anywhere and
+/// pcl::PCDReader (1.13) trusts them: an empty file is a segmentation fault, a word
+/// where a number belongs is read as 0, a compressed block that claims 2 GiB does not
+/// end, a huge header is a bad_alloc, and coordinates in double precision come out as
+/// zeros.
+///
+/// What pcl::PCDReader reads and this one refuses, since it would be read wrongly:
+/// - a field x, y, z or covariance twice, or x, y or z with a COUNT other than 1;
+/// - x, y, z or covariance with a word that is not a number;
+/// - binary data of 1000 points or more whose size fits the number of points, but with
+///   more bytes per point than the header announces: some field is missing there;
+/// - a compressed block of another size than the header announces;
+/// - more points than LoadOptions::max_points.
 #include "cloud_readers.h"
 
 #include <pcl/io/lzf.h>
@@ -6,7 +19,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
+
+#include <fmt/format.h>
 
 namespace holdfast::io {
 namespace {
@@ -42,13 +58,24 @@ corrupt(const std::string& what)
   throw std::runtime_error("corrupt PCD header: " + what);
 }
 
+std::string
+lower(std::string_view word)
+{
+  std::string text(word);
+  for (char& c : text)
+    c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
 /// The entries of the header, each split into words, up to and including DATA.
 /// `bytes` is left at the data.
 std::vector<std::vector<std::string_view>>
 headerEntries(std::string_view& bytes)
 {
+  bytes = skipToText(bytes);
+  const char line_end = lineEnd(bytes);
   std::vector<std::vector<std::string_view>> entries;
-  while (const auto line = takeLine(bytes)) {
+  while (const auto line = takeLine(bytes, line_end)) {
     auto words = splitWords(*line);
     if (words.empty() || words[0][0] == '#')
       continue;
@@ -70,29 +97,44 @@ find(const std::vector<Words>& entries, std::string_view name)
   return entry == entries.end() ? nullptr : &*entry;
 }
 
-std::uint64_t
+/// A count of the header, if it is there.
+std::optional<std::uint64_t>
 countEntry(const std::vector<Words>& entries, const std::string& name)
 {
   const Words* entry = find(entries, name);
   if (entry == nullptr)
-    corrupt("no " + name);
+    return std::nullopt;
   const auto value = entry->size() == 2 ? parseCount((*entry)[1]) : std::nullopt;
   if (!value)
-    corrupt(name + " is no count");
-  return *value;
+    corrupt(name + " is not a count");
+  return value;
 }
 
-/// SIZE, TYPE or COUNT: one word per field.
-const Words&
+/// SIZE, TYPE or COUNT: one word per field. Files before v0.6 have none of them.
+const Words*
 perField(const std::vector<Words>& entries, const std::string& name, std::size_t n)
 {
   const Words* entry = find(entries, name);
-  if (entry == nullptr)
-    corrupt("no " + name);
-  if (entry->size() != n + 1)
-    corrupt(name + " has " + std::to_string(entry->size() - 1) + " values for " +
-            std::to_string(n) + " fields");
-  return *entry;
+  if (entry != nullptr && entry->size() != n + 1)
+    corrupt(fmt::format("{} has {} values for {} fields", name, entry->size() - 1, n));
+  return entry;
+}
+
+ScalarType
+parseType(const Words* size, const Words* type, std::size_t i)
+{
+  ScalarType scalar; // float, when the header does not say
+  if (size != nullptr)
+    scalar.size = static_cast<int>(
+        std::min<std::uint64_t>(parseCount((*size)[i]).value_or(0), 9));
+  if (type == nullptr)
+    return scalar;
+  const std::string name = lower((*type)[i]);
+  scalar.kind = name == "f"                ? 'F' :
+                name == "i"                ? 'I' :
+                name == "u" || name == "b" ? 'U' : // b: bool
+                                             '?';
+  return scalar;
 }
 
 std::vector<Field>
@@ -100,24 +142,26 @@ parseFields(const std::vector<Words>& entries)
 {
   const Words* names = find(entries, "FIELDS");
   if (names == nullptr)
+    names = find(entries, "COLUMNS");
+  if (names == nullptr)
     corrupt("no FIELDS");
   const std::size_t n = names->size() - 1;
-  const Words& sizes = perField(entries, "SIZE", n);
-  const Words& types = perField(entries, "TYPE", n);
-  const Words* counts =
-      find(entries, "COUNT") != nullptr ? &perField(entries, "COUNT", n) : nullptr;
+  const Words* sizes = perField(entries, "SIZE", n);
+  const Words* types = perField(entries, "TYPE", n);
+  const Words* counts = perField(entries, "COUNT", n);
   std::vector<Field> fields(n);
   for (std::size_t i = 0; i < n; ++i) {
     fields[i].name = (*names)[i + 1];
-    fields[i].type.size = static_cast<int>(
-        std::min<std::uint64_t>(parseCount(sizes[i + 1]).value_or(0), 9));
-    fields[i].type.kind = types[i + 1].size() == 1 ? types[i + 1][0] : '?';
+    fields[i].type = parseType(sizes, types, i + 1);
     if (!fields[i].type.isValid())
-      corrupt("field " + fields[i].name + " has no valid TYPE and SIZE");
-    fields[i].count = counts ? parseCount((*counts)[i + 1]).value_or(0) : 1;
-    // The largest real fields are histograms of some thousand bins.
-    if (fields[i].count < 1 || fields[i].count > 1000000)
-      corrupt("COUNT of field " + fields[i].name + " is impossible");
+      corrupt("field " + printable(fields[i].name) + " has no valid TYPE and SIZE");
+    // The largest real fields are histograms of some thousand bins; 0 is a column that
+    // is not there.
+    constexpr std::uint64_t kTooMany = 1000001;
+    if (counts != nullptr)
+      fields[i].count = parseCount((*counts)[i + 1]).value_or(kTooMany);
+    if (fields[i].count >= kTooMany)
+      corrupt("COUNT of field " + printable(fields[i].name) + " is impossible");
   }
   return fields;
 }
@@ -126,28 +170,27 @@ std::optional<Pose>
 parseViewpoint(const Words& entry, std::vector<std::string>& notices)
 {
   std::array<double, 7> v{};
-  if (entry.size() != v.size() + 1)
-    corrupt("VIEWPOINT has " + std::to_string(entry.size() - 1) + " values, not 7");
-  for (std::size_t i = 0; i < v.size(); ++i) {
+  bool complete = entry.size() > v.size();
+  for (std::size_t i = 0; complete && i < v.size(); ++i) {
     const auto value = parseNumber(entry[i + 1]);
-    if (!value)
-      corrupt("VIEWPOINT is not made of numbers");
-    v[i] = *value;
+    complete = value.has_value();
+    v[i] = value.value_or(0.0);
   }
   const Eigen::Quaterniond q(v[3], v[4], v[5], v[6]);
   const Eigen::Vector3d c(v[0], v[1], v[2]);
-  if (!c.allFinite() || !(q.norm() > 1e-6) || !std::isfinite(q.norm())) {
-    notices.emplace_back("VIEWPOINT is no pose; taken as the identity");
+  if (!complete || !c.allFinite() || !(q.norm() > 1e-6) || !std::isfinite(q.norm())) {
+    notices.emplace_back("VIEWPOINT is not a pose; taken as not given");
     return std::nullopt;
   }
   return Pose{q.normalized().toRotationMatrix(), c};
 }
 
 void
-checkNames(const std::vector<Words>& entries)
+noteUnknownEntries(const std::vector<Words>& entries, std::vector<std::string>& notices)
 {
-  constexpr std::array<std::string_view, 10> kNames{"VERSION",
+  constexpr std::array<std::string_view, 11> kNames{"VERSION",
                                                     "FIELDS",
+                                                    "COLUMNS",
                                                     "SIZE",
                                                     "TYPE",
                                                     "COUNT",
@@ -156,25 +199,39 @@ checkNames(const std::vector<Words>& entries)
                                                     "VIEWPOINT",
                                                     "POINTS",
                                                     "DATA"};
+  std::string unknown;
+  int n = 0;
   for (const Words& entry : entries)
-    if (std::find(kNames.begin(), kNames.end(), entry[0]) == kNames.end())
-      corrupt("unknown entry '" + std::string(entry[0].substr(0, 20)) + "'");
+    if (std::find(kNames.begin(), kNames.end(), entry[0]) == kNames.end() && n++ == 0)
+      unknown = printable(entry[0]);
+  if (n > 0)
+    notices.push_back(fmt::format("{} unknown header line{} ignored, the first: '{}'",
+                                  n,
+                                  n > 1 ? "s" : "",
+                                  unknown));
 }
 
-/// Width, height and number of points; HEIGHT and POINTS were optional before v0.7.
+/// Width, height and number of points, as PCL sees them: WIDTH and HEIGHT came with
+/// v0.6, before there were POINTS alone.
 void
 parseSize(const std::vector<Words>& entries, Header& header)
 {
-  header.width = countEntry(entries, "WIDTH");
-  if (find(entries, "HEIGHT") != nullptr)
-    header.height = countEntry(entries, "HEIGHT");
+  const auto width = countEntry(entries, "WIDTH");
+  const auto announced = countEntry(entries, "POINTS");
+  header.height = countEntry(entries, "HEIGHT").value_or(1);
+  if (!width && !announced)
+    corrupt("neither WIDTH nor POINTS");
+  if (header.height == 0)
+    header.height = 1;
+  header.width = width.value_or(0);
+  if (header.width == 0 && header.height == 1)
+    header.width = announced.value_or(0);
   const auto points = product(header.width, header.height);
   // Indices of points are of type int everywhere.
   if (!points || *points > 0x7fffffffU)
     corrupt("WIDTH x HEIGHT is impossibly large");
   header.points = *points;
-  if (find(entries, "POINTS") != nullptr &&
-      countEntry(entries, "POINTS") != header.points)
+  if (announced.value_or(header.points) != header.points)
     corrupt("POINTS is not WIDTH x HEIGHT");
 }
 
@@ -182,8 +239,8 @@ Header
 parseHeader(std::string_view& bytes)
 {
   const std::vector<Words> entries = headerEntries(bytes);
-  checkNames(entries);
   Header header;
+  noteUnknownEntries(entries, header.notices);
   header.fields = parseFields(entries);
   for (Field& field : header.fields) {
     field.offset = header.point_bytes;
@@ -195,7 +252,7 @@ parseHeader(std::string_view& bytes)
   if (const Words* viewpoint = find(entries, "VIEWPOINT"))
     header.viewpoint = parseViewpoint(*viewpoint, header.notices);
   const Words& data = entries.back();
-  header.data = data.size() == 2 ? data[1] : std::string_view();
+  header.data = data.size() >= 2 ? lower(data[1]) : std::string();
   return header;
 }
 
@@ -207,51 +264,104 @@ struct WantedFields {
   const Field* covariance = nullptr;
 };
 
+/// The field of this name; in capitals, when there is none in small letters.
+const Field*
+fieldNamed(const Header& header, const std::string& name)
+{
+  const Field* found = nullptr;
+  for (const bool any_case : {false, true}) {
+    for (const Field& field : header.fields) {
+      if (any_case ? lower(field.name) != name : field.name != name)
+        continue;
+      if (found != nullptr)
+        corrupt("two fields " + name);
+      found = &field;
+    }
+    if (found != nullptr)
+      break;
+  }
+  return found;
+}
+
 WantedFields
 wantedFields(const Header& header)
 {
-  WantedFields wanted;
-  for (const Field& field : header.fields) {
-    const Field** slot = field.name == "x"          ? &wanted.x :
-                         field.name == "y"          ? &wanted.y :
-                         field.name == "z"          ? &wanted.z :
-                         field.name == "covariance" ? &wanted.covariance :
-                                                      nullptr;
-    if (slot == nullptr)
-      continue;
-    if (*slot != nullptr)
-      corrupt("two fields " + field.name);
-    if (field.count != (field.name == "covariance" ? 6U : 1U))
-      corrupt("field " + field.name + " has COUNT " + std::to_string(field.count) +
-              (field.name == "covariance" ? ", not 6" : ", not 1"));
-    *slot = &field;
+  const WantedFields wanted{fieldNamed(header, "x"),
+                            fieldNamed(header, "y"),
+                            fieldNamed(header, "z"),
+                            fieldNamed(header, "covariance")};
+  for (const Field* field : {wanted.x, wanted.y, wanted.z}) {
+    if (field == nullptr)
+      throw std::runtime_error("has no fields x, y and z");
+    if (field->count != 1)
+      corrupt(fmt::format("field {} has COUNT {}, not 1", field->name, field->count));
   }
-  if (wanted.x == nullptr || wanted.y == nullptr || wanted.z == nullptr)
-    throw std::runtime_error("has no fields x, y and z");
+  if (wanted.covariance != nullptr && wanted.covariance->count != 6 &&
+      wanted.covariance->count != 9)
+    corrupt(fmt::format("field covariance has COUNT {}, not 6 (xx xy xz yy yz zz) or 9",
+                        wanted.covariance->count));
   return wanted;
+}
+
+/// True when coordinates may have more digits than float.
+bool
+exceedFloat(const WantedFields& wanted, bool ascii)
+{
+  const auto is_float = [](const Field* field) {
+    return field->type.size < 4 || (field->type.kind == 'F' && field->type.size == 4);
+  };
+  return ascii || !is_float(wanted.x) || !is_float(wanted.y) || !is_float(wanted.z);
+}
+
+/// The upper triangle (COUNT 6) or the whole matrix (COUNT 9).
+/// \throw std::runtime_error when the matrix is not symmetric.
+template <typename Number>
+Eigen::Matrix3f
+covarianceOf(const Number& number, std::uint64_t count, std::size_t point)
+{
+  Eigen::Matrix3d s;
+  if (count == 6) {
+    s << number(0), number(1), number(2), number(1), number(3), number(4), number(2),
+        number(4), number(5);
+    return s.cast<float>();
+  }
+  for (int k = 0; k < 9; ++k)
+    s(k / 3, k % 3) = number(static_cast<std::size_t>(k));
+  // Text of few digits rounds both halves alike.
+  if ((s - s.transpose()).cwiseAbs().maxCoeff() > 1e-5 * s.cwiseAbs().maxCoeff())
+    throw std::runtime_error(fmt::format("the covariance of point {} is not symmetric: "
+                                         "nine numbers are read row by row",
+                                         point));
+  return s.cast<float>();
 }
 
 /// Fills the cloud from `value(field, point, element)`.
 template <typename Value>
 void
-fillPoints(const WantedFields& wanted, const Value& value, RawCloud& cloud)
+fillPoints(const WantedFields& wanted, bool ascii, const Value& value, RawCloud& cloud)
 {
-  const auto number = [&](const Field* field, std::size_t i, std::size_t element = 0) {
-    return static_cast<float>(value(*field, i, element));
-  };
   auto& points = *cloud.points;
-  for (std::size_t i = 0; i < points.size(); ++i)
-    points[i].getVector3fMap() << number(wanted.x, i), number(wanted.y, i),
-        number(wanted.z, i);
+  const double unit = cloud.info.unit_m;
+  const std::array<const Field*, 3> axes{wanted.x, wanted.y, wanted.z};
+  if (exceedFloat(wanted, ascii)) {
+    std::vector<double> xyz(3 * points.size());
+    for (std::size_t i = 0; i < xyz.size(); ++i)
+      xyz[i] = unit * value(*axes[i % 3], i / 3, 0);
+    placePoints(xyz, cloud);
+  }
+  else {
+    for (std::size_t i = 0; i < points.size(); ++i)
+      for (std::size_t k = 0; k < 3; ++k)
+        points[i].data[k] = static_cast<float>(unit * value(*axes[k], i, 0));
+  }
   if (wanted.covariance == nullptr)
     return;
   cloud.covariances.resize(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    std::array<float, 6> s; // xx xy xz yy yz zz
-    for (std::size_t k = 0; k < s.size(); ++k)
-      s[k] = number(wanted.covariance, i, k);
-    cloud.covariances[i] << s[0], s[1], s[2], s[1], s[3], s[4], s[2], s[4], s[5];
-  }
+  for (std::size_t i = 0; i < points.size(); ++i)
+    cloud.covariances[i] = covarianceOf(
+        [&](std::size_t k) { return unit * unit * value(*wanted.covariance, i, k); },
+        wanted.covariance->count,
+        i);
 }
 
 void
@@ -262,41 +372,90 @@ resize(RawCloud& cloud, const Header& header)
   cloud.points->height = static_cast<std::uint32_t>(header.height);
 }
 
-/// The numbers of the text, row by row; one row per point.
-std::vector<double>
-parseTable(std::string_view data, std::size_t rows, std::size_t columns)
+/// The numbers of text that are used, row by row; one row per point.
+struct Table {
+  /// Per column of the file: its place in a row of `values`, or -1.
+  std::vector<int> slots;
+  std::size_t row_values = 0;
+  std::vector<double> values;
+  std::size_t longest_row = 0; ///< words in a line
+};
+
+/// Columns that nobody uses need not hold numbers.
+Table
+wantedColumns(const Header& header, const WantedFields& wanted)
 {
-  // Every value takes a digit and a blank or line end at least.
-  const auto values = product(rows, columns);
-  if (!values || *values > (data.size() + 1) / 2)
-    throw std::runtime_error("truncated: too short for " + std::to_string(rows) +
-                             " points");
-  std::vector<double> table;
-  table.reserve(*values);
-  while (const auto line = takeLine(data)) {
-    const std::string point = "point " + std::to_string(table.size() / columns);
-    const Words words = splitWords(*line);
-    if (words.empty())
-      continue;
-    if (table.size() == *values)
-      throw std::runtime_error("corrupt: more rows than the " + std::to_string(rows) +
-                               " points announced");
-    if (words.size() != columns)
-      throw std::runtime_error("truncated or corrupt: " + point + " has " +
-                               std::to_string(words.size()) + " values instead of " +
-                               std::to_string(columns));
-    for (const auto word : words) {
-      const auto value = parseNumber(word);
-      if (!value)
-        throw std::runtime_error("corrupt: " + point +
-                                 " has a value that is no number");
-      table.push_back(*value);
-    }
-  }
-  if (table.size() < *values)
-    throw std::runtime_error("truncated: " + std::to_string(table.size() / columns) +
-                             " of " + std::to_string(rows) + " points");
+  Table table;
+  table.slots.assign(header.columns, -1);
+  for (const Field* field : {wanted.x, wanted.y, wanted.z, wanted.covariance})
+    for (std::uint64_t k = 0; field != nullptr && k < field->count; ++k)
+      table.slots[field->column + k] = static_cast<int>(table.row_values++);
   return table;
+}
+
+void
+parseRow(std::string_view line, std::size_t row, Table& table)
+{
+  std::size_t column = 0;
+  double* values = table.values.data() + row * table.row_values;
+  for (auto word = takeWord(line); !word.empty(); word = takeWord(line), ++column) {
+    if (column >= table.slots.size() || table.slots[column] < 0)
+      continue;
+    const auto value = parseNumber(word);
+    if (!value)
+      throw std::runtime_error(
+          fmt::format("corrupt: point {} has a value that is not a number", row));
+    values[table.slots[column]] = *value;
+  }
+  if (column < table.slots.size())
+    throw std::runtime_error(
+        fmt::format("truncated or corrupt: point {} has {} values instead of {}",
+                    row,
+                    column,
+                    table.slots.size()));
+  table.longest_row = std::max(table.longest_row, column);
+}
+
+bool
+isBlank(std::string_view line)
+{
+  return takeWord(line).empty();
+}
+
+/// Fills the table.
+/// \return what was left over, as a notice for each.
+std::vector<std::string>
+parseRows(std::string_view data, std::size_t rows, Table& table)
+{
+  const std::size_t columns = table.slots.size();
+  table.values.resize(rows * table.row_values);
+  const char line_end = lineEnd(data);
+  std::size_t row = 0;
+  std::size_t surplus = 0;
+  while (const auto line = takeLine(data, line_end)) {
+    if (isBlank(*line))
+      continue;
+    if (row == rows)
+      ++surplus;
+    else
+      parseRow(*line, row++, table);
+  }
+  if (row < rows)
+    throw std::runtime_error(fmt::format("truncated: {} of {} points", row, rows));
+  std::vector<std::string> notices;
+  if (surplus > 0)
+    notices.push_back(
+        fmt::format("{} more row{} than the {} points announced: not used",
+                    surplus,
+                    surplus > 1 ? "s" : "",
+                    rows));
+  if (table.longest_row > columns)
+    notices.push_back(fmt::format(
+        "rows of up to {} values where the header announces {}: the first {} are used",
+        table.longest_row,
+        columns,
+        columns));
+  return notices;
 }
 
 void
@@ -305,14 +464,42 @@ readAscii(std::string_view data,
           const WantedFields& wanted,
           RawCloud& cloud)
 {
-  const std::vector<double> table = parseTable(data, header.points, header.columns);
+  // Every value takes a digit and a blank or line end at least.
+  const auto values = product(header.points, header.columns);
+  if (!values || *values > (data.size() + 1) / 2)
+    throw std::runtime_error(
+        fmt::format("truncated: too short for {} points", header.points));
+  Table table = wantedColumns(header, wanted);
+  for (const std::string& notice : parseRows(data, header.points, table))
+    cloud.info.notices.push_back(notice);
   resize(cloud, header);
   fillPoints(
       wanted,
+      true,
       [&](const Field& field, std::size_t i, std::size_t element) {
-        return table[i * header.columns + field.column + element];
+        return table
+            .values[i * table.row_values +
+                    static_cast<std::size_t>(table.slots[field.column + element])];
       },
       cloud);
+}
+
+/// Some writers pad with zeros; what else is left over may mean that the header is
+/// wrong.
+void
+judgeSurplus(std::string_view surplus, const Header& header, RawCloud& cloud)
+{
+  if (surplus.find_first_not_of('\0') == std::string_view::npos)
+    return;
+  // In a small cloud that may be chance.
+  if (header.points >= 1000 && surplus.size() % header.points == 0 &&
+      surplus.size() % header.point_bytes != 0)
+    throw std::runtime_error(
+        fmt::format("corrupt: {} bytes of data per point where the header announces {}",
+                    header.point_bytes + surplus.size() / header.points,
+                    header.point_bytes));
+  cloud.info.notices.push_back(
+      fmt::format("{} bytes behind the last point: not used", surplus.size()));
 }
 
 /// Points one after the other.
@@ -324,16 +511,16 @@ readBinary(std::string_view data,
 {
   const auto expected = product(header.points, header.point_bytes);
   if (!expected || *expected > data.size())
-    throw std::runtime_error("truncated: " + std::to_string(data.size()) +
-                             " bytes of data for " + std::to_string(header.points) +
-                             " points of " + std::to_string(header.point_bytes) +
-                             " bytes");
-  // Some writers pad with zeros; anything else means that the header is wrong.
-  if (data.find_first_not_of('\0', *expected) != std::string_view::npos)
-    throw std::runtime_error("corrupt: more data than the header announces");
+    throw std::runtime_error(
+        fmt::format("truncated: {} bytes of data for {} points of {} bytes",
+                    data.size(),
+                    header.points,
+                    header.point_bytes));
+  judgeSurplus(data.substr(*expected), header, cloud);
   resize(cloud, header);
   fillPoints(
       wanted,
+      false,
       [&](const Field& field, std::size_t i, std::size_t element) {
         return field.type.read(data.data() + i * header.point_bytes + field.offset +
                                element * static_cast<std::size_t>(field.type.size));
@@ -353,8 +540,8 @@ decompress(std::string_view data, std::uint64_t expected)
   const auto uncompressed = static_cast<std::uint64_t>(word.read(data.data() + 4));
   data.remove_prefix(kSizes);
   if (compressed > data.size())
-    throw std::runtime_error("truncated: " + std::to_string(data.size()) + " of " +
-                             std::to_string(compressed) + " compressed bytes");
+    throw std::runtime_error(
+        fmt::format("truncated: {} of {} compressed bytes", data.size(), compressed));
   // Three bytes of LZF stand for 264 bytes at most.
   if (uncompressed != expected || uncompressed / 88 > compressed)
     throw std::runtime_error("corrupt: compressed data of another size than the header "
@@ -384,6 +571,7 @@ readCompressed(std::string_view data,
   resize(cloud, header);
   fillPoints(
       wanted,
+      false,
       [&](const Field& field, std::size_t i, std::size_t element) {
         return field.type.read(plain.data() + field.offset * header.points +
                                i * field.bytes() +
@@ -395,13 +583,19 @@ readCompressed(std::string_view data,
 } // namespace
 
 RawCloud
-readPcd(std::string_view bytes)
+readPcd(std::string_view bytes, const LoadOptions& options)
 {
   Header header = parseHeader(bytes);
   const WantedFields wanted = wantedFields(header);
   if (header.points == 0)
     throw std::runtime_error("holds no points");
+  checkPointCount(header.points, options.max_points);
   RawCloud cloud;
+  cloud.info.unit_m = options.unit_m;
+  cloud.info.viewpoint = header.viewpoint;
+  if (cloud.info.viewpoint)
+    cloud.info.viewpoint->c *= options.unit_m;
+  cloud.info.notices = std::move(header.notices);
   if (header.data == "ascii")
     readAscii(bytes, header, wanted, cloud);
   else if (header.data == "binary")
@@ -413,8 +607,6 @@ readPcd(std::string_view bytes)
   cloud.info.format = "PCD " + header.data;
   for (const Field& field : header.fields)
     cloud.info.fields.push_back(field.name);
-  cloud.info.viewpoint = header.viewpoint;
-  cloud.info.notices = std::move(header.notices);
   return cloud;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <limits>
 
 namespace holdfast::io {
 namespace {
@@ -29,14 +30,79 @@ parseWhole(std::string_view word)
   return value;
 }
 
+/// A number whose size double cannot hold: 0 or infinite.
+double
+beyondDouble(std::string_view word)
+{
+  const bool negative = word[0] == '-';
+  const std::size_t e = word.find_first_of("eE");
+  const std::string_view digits = word.substr(0, e);
+  const bool small = e == std::string_view::npos ? digits.find_first_of("123456789") >
+                                                       digits.find('.') : // 0.000...1
+                         word.substr(e + 1, 1) == "-";
+  const double size = small ? 0.0 : std::numeric_limits<double>::infinity();
+  return negative ? -size : size;
+}
+
+/// The other spellings: of Microsoft's library (1.#QNAN, -1.#IND, 1.#INF) and
+/// "nan(ind)".
+std::optional<double>
+parseNotFinite(std::string_view word)
+{
+  std::string text(word.substr(0, 20));
+  for (char& c : text)
+    c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  const bool negative = !text.empty() && text[0] == '-';
+  text.erase(0, negative ? 1 : 0);
+  const auto starts = [&text](std::string_view start) {
+    return text.compare(0, start.size(), start) == 0;
+  };
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  if (starts("1.#inf"))
+    return negative ? -kInfinity : kInfinity;
+  if (starts("1.#qnan") || starts("1.#snan") || starts("1.#ind") || starts("1.#nan") ||
+      (starts("nan(") && text.back() == ')'))
+    return std::numeric_limits<double>::quiet_NaN();
+  return std::nullopt;
+}
+
 } // namespace
 
+std::string
+printable(std::string_view text)
+{
+  std::string shown(text.substr(0, 40));
+  for (char& c : shown)
+    if (c < ' ' || c > '~')
+      c = '?';
+  return shown;
+}
+
+std::string_view
+skipToText(std::string_view bytes)
+{
+  constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+  if (bytes.substr(0, kByteOrderMark.size()) == kByteOrderMark)
+    bytes.remove_prefix(kByteOrderMark.size());
+  bytes.remove_prefix(std::min(bytes.find_first_not_of(kBlanks), bytes.size()));
+  return bytes;
+}
+
+char
+lineEnd(std::string_view text)
+{
+  const std::size_t end = text.find_first_of("\r\n");
+  const bool cr_only = end != std::string_view::npos && text[end] == '\r' &&
+                       (end + 1 == text.size() || text[end + 1] != '\n');
+  return cr_only ? '\r' : '\n';
+}
+
 std::optional<std::string_view>
-takeLine(std::string_view& text)
+takeLine(std::string_view& text, char line_end)
 {
   if (text.empty())
     return std::nullopt;
-  const std::size_t end = text.find('\n');
+  const std::size_t end = text.find(line_end);
   std::string_view line = text.substr(0, end);
   text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
   if (!line.empty() && line.back() == '\r')
@@ -68,7 +134,14 @@ parseNumber(std::string_view word)
   // from_chars takes no plus sign.
   if (word.size() > 1 && word[0] == '+' && word[1] != '-')
     word.remove_prefix(1);
-  return parseWhole<double>(word);
+  double value = 0.0;
+  const char* end = word.data() + word.size();
+  const auto result = std::from_chars(word.data(), end, value);
+  if (result.ec == std::errc() && result.ptr == end && !word.empty())
+    return value;
+  if (result.ec == std::errc::result_out_of_range && result.ptr == end)
+    return beyondDouble(word);
+  return parseNotFinite(word);
 }
 
 std::optional<std::uint64_t>
