@@ -16,6 +16,8 @@
 #include <memory>
 #include <optional>
 
+#include <fmt/format.h>
+
 namespace holdfast::app {
 namespace {
 
@@ -24,6 +26,7 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kExamples = R"(Examples:
   holdfast info scene.pcd
   holdfast info clouds/ --json -
+  holdfast info scan.ply --unit mm --axes opengl
 )";
 
 struct InfoSettings {
@@ -38,16 +41,17 @@ struct CloudFacts {
   int width = 0;
   int height = 0;
   int valid = 0;
-  Eigen::AlignedBox3d bounds; ///< of the valid points, m
+  Eigen::AlignedBox3d bounds; ///< of the valid points, m, in the frame of the file
   double nearest_m = 0.0; ///< depth from the sensor along its axis
   double farthest_m = 0.0;
-  Pose sensor_pose;
+  Pose sensor_pose; ///< in the frame of the file
   std::optional<Camera> camera; ///< recovered from the points
   double camera_rms_px = 0.0;
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero(); ///< of RangeCloud
   bool has_covariances = false;
   int invalid_covariances = 0;
 
-  double nanShare() const
+  double invalidShare() const
   {
     return 1.0 - static_cast<double>(valid) / (static_cast<double>(width) * height);
   }
@@ -64,7 +68,7 @@ measureExtent(const RangeCloud& cloud, CloudFacts& facts)
       continue;
     const Eigen::Vector3d q = point.getVector3fMap().cast<double>();
     const double depth = to_camera.toWorld(q).z();
-    facts.bounds.extend(q);
+    facts.bounds.extend(q + facts.offset);
     facts.nearest_m = std::min(facts.nearest_m, depth);
     facts.farthest_m = std::max(facts.farthest_m, depth);
   }
@@ -80,8 +84,10 @@ factsAbout(const std::string& path, const InputOptions& input, const Sensor& sen
   facts.width = static_cast<int>(cloud.points->width);
   facts.height = static_cast<int>(cloud.points->height);
   facts.valid = countValidPoints(cloud);
+  facts.offset = cloud.offset;
   measureExtent(cloud, facts);
   facts.sensor_pose = cloud.sensor_pose;
+  facts.sensor_pose.c += cloud.offset;
   facts.camera = recoverIntrinsics(cloud, &facts.camera_rms_px);
   facts.has_covariances = !cloud.covariances.empty();
   facts.invalid_covariances = countInvalidCovariances(cloud);
@@ -97,14 +103,28 @@ poseJson(const Pose& pose)
 }
 
 Json
-cameraJson(const CloudFacts& facts)
+cameraJson(const Camera& camera)
 {
-  const Camera& camera = *facts.camera;
-  return {{"fx", camera.fx},
-          {"fy", camera.fy},
-          {"cx", camera.cx},
-          {"cy", camera.cy},
-          {"rms_px", facts.camera_rms_px}};
+  return {{"fx", camera.fx}, {"fy", camera.fy}, {"cx", camera.cx}, {"cy", camera.cy}};
+}
+
+/// The camera that the points themselves show.
+Json
+recoveredJson(const CloudFacts& facts)
+{
+  if (!facts.camera)
+    return {};
+  Json json = cameraJson(*facts.camera);
+  json["rms_px"] = facts.camera_rms_px;
+  return json;
+}
+
+const char*
+axesName(CloudAxes axes)
+{
+  return axes == CloudAxes::OpenGl ? "opengl" :
+         axes == CloudAxes::Ros    ? "ros" :
+                                     "x-right,y-down,z-forward";
 }
 
 Json
@@ -124,13 +144,20 @@ factsJson(const CloudFacts& facts)
       {"organized", facts.height > 1},
       {"fields", facts.file.fields},
       {"valid_points", facts.valid},
-      {"nan_share", facts.nanShare()},
+      {"invalid_points", facts.width * facts.height - facts.valid},
+      {"nan_share", facts.invalidShare()},
+      {"zero_points", facts.file.zero_points},
+      {"out_of_range_pixels", facts.file.out_of_range_pixels},
       {"min", {low.x(), low.y(), low.z()}},
       {"max", {high.x(), high.y(), high.z()}},
       {"depth_range", {facts.nearest_m, facts.farthest_m}},
+      {"unit_m", facts.file.unit_m},
+      {"axes", axesName(facts.file.axes)},
+      {"offset", {facts.offset.x(), facts.offset.y(), facts.offset.z()}},
+      {"camera", facts.file.camera ? cameraJson(*facts.file.camera) : Json()},
       {"viewpoint", facts.file.viewpoint ? poseJson(*facts.file.viewpoint) : Json()},
       {"sensor_pose", poseJson(facts.sensor_pose)},
-      {"intrinsics", facts.camera ? cameraJson(facts) : Json()},
+      {"intrinsics", recoveredJson(facts)},
       {"covariances", covariances},
       {"notices", facts.file.notices}};
 }
@@ -138,29 +165,39 @@ factsJson(const CloudFacts& facts)
 std::string
 vectorText(const Eigen::Vector3d& v)
 {
-  return formatNumber("%.3f ", v.x()) + formatNumber("%.3f ", v.y()) +
-         formatNumber("%.3f", v.z());
+  return fmt::format("{:.3f} {:.3f} {:.3f}", v.x(), v.y(), v.z());
 }
 
 std::string
 poseText(const Pose& pose)
 {
   const Eigen::Quaterniond q(pose.R);
-  return "at " + vectorText(pose.c) + " m, orientation (w x y z) " +
-         formatNumber("%.4f ", q.w()) + formatNumber("%.4f ", q.x()) +
-         formatNumber("%.4f ", q.y()) + formatNumber("%.4f", q.z());
+  return fmt::format("at {} m, orientation (w x y z) {:.4f} {:.4f} {:.4f} {:.4f}",
+                     vectorText(pose.c),
+                     q.w(),
+                     q.x(),
+                     q.y(),
+                     q.z());
 }
 
 std::string
-cameraText(const CloudFacts& facts)
+cameraText(const Camera& camera)
+{
+  return fmt::format("fx {:.1f}, fy {:.1f}, cx {:.1f}, cy {:.1f} px",
+                     camera.fx,
+                     camera.fy,
+                     camera.cx,
+                     camera.cy);
+}
+
+std::string
+recoveredText(const CloudFacts& facts)
 {
   if (!facts.camera)
     return facts.height > 1 ? "none fit the pixel grid" : "none, not organized";
-  const Camera& camera = *facts.camera;
-  return "fx " + formatNumber("%.1f", camera.fx) + ", fy " +
-         formatNumber("%.1f", camera.fy) + ", cx " + formatNumber("%.1f", camera.cx) +
-         ", cy " + formatNumber("%.1f", camera.cy) + " px, rms " +
-         formatNumber("%.2f", facts.camera_rms_px) + " px";
+  return fmt::format("{}, rms {:.2f} px",
+                     cameraText(*facts.camera),
+                     facts.camera_rms_px);
 }
 
 std::string
@@ -168,32 +205,54 @@ covarianceText(const CloudFacts& facts)
 {
   if (!facts.has_covariances)
     return "none";
-  return std::to_string(facts.valid - facts.invalid_covariances) + " valid, " +
-         std::to_string(facts.invalid_covariances) + " invalid";
+  return fmt::format("{} valid, {} invalid",
+                     facts.valid - facts.invalid_covariances,
+                     facts.invalid_covariances);
+}
+
+/// What was not simply taken from the file.
+std::string
+appliedText(const CloudFacts& facts)
+{
+  std::string text;
+  if (facts.file.unit_m != 1.0)
+    text += fmt::format("  unit         {} m\n", facts.file.unit_m);
+  if (facts.file.axes != CloudAxes::Camera)
+    text += fmt::format("  axes         {}\n", axesName(facts.file.axes));
+  if (!facts.offset.isZero(0.0))
+    text += fmt::format("  offset       {} m\n", vectorText(facts.offset));
+  if (facts.file.camera)
+    text += fmt::format("  camera       {}\n", cameraText(*facts.file.camera));
+  return text;
 }
 
 std::string
 factsText(const CloudFacts& facts)
 {
-  std::string fields;
-  for (const std::string& field : facts.file.fields)
-    fields += (fields.empty() ? "" : " ") + field;
-  const std::string size = std::to_string(facts.width) + " x " +
-                           std::to_string(facts.height) +
-                           (facts.height > 1 ? ", organized, " : ", not organized, ") +
-                           std::to_string(facts.valid) + " valid points, " +
-                           formatNumber("%.1f", 100.0 * facts.nanShare()) + " % NaN";
-  std::string text =
-      facts.path + "\n  format       " + facts.file.format + "\n  fields       " +
-      fields + "\n  size         " + size + "\n  bounds       " +
-      vectorText(facts.bounds.min()) + " to " + vectorText(facts.bounds.max()) +
-      " m\n  depth        " + formatNumber("%.3f to ", facts.nearest_m) +
-      formatNumber("%.3f m", facts.farthest_m) + "\n  viewpoint    " +
-      (facts.file.viewpoint ? poseText(*facts.file.viewpoint) : "none") +
-      "\n  sensor       " + poseText(facts.sensor_pose) + "\n  intrinsics   " +
-      cameraText(facts) + "\n  covariances  " + covarianceText(facts) + "\n";
+  std::string text = fmt::format("{}\n  format       {}\n  fields       {}\n",
+                                 facts.path == "-" ? "standard input" : facts.path,
+                                 facts.file.format,
+                                 fmt::join(facts.file.fields, " "));
+  text += fmt::format("  size         {} x {}, {}, {} valid points, {:.1f} % invalid\n",
+                      facts.width,
+                      facts.height,
+                      facts.height > 1 ? "organized" : "not organized",
+                      facts.valid,
+                      100.0 * facts.invalidShare());
+  text += fmt::format("  bounds       {} to {} m\n  depth        {:.3f} to {:.3f} m\n",
+                      vectorText(facts.bounds.min()),
+                      vectorText(facts.bounds.max()),
+                      facts.nearest_m,
+                      facts.farthest_m);
+  text += appliedText(facts);
+  text += fmt::format(
+      "  viewpoint    {}\n  sensor       {}\n  intrinsics   {}\n  covariances  {}\n",
+      facts.file.viewpoint ? poseText(*facts.file.viewpoint) : "none",
+      poseText(facts.sensor_pose),
+      recoveredText(facts),
+      covarianceText(facts));
   for (const std::string& notice : facts.file.notices)
-    text += "  note         " + notice + "\n";
+    text += fmt::format("  note         {}\n", notice);
   return text;
 }
 

@@ -5,8 +5,14 @@
 #include <holdfast/io/config.h>
 
 #include <CLI/CLI.hpp>
+#include <Eigen/Geometry>
 
+#include <charconv>
+#include <cmath>
+#include <functional>
 #include <stdexcept>
+
+#include <fmt/format.h>
 
 namespace holdfast::app {
 namespace {
@@ -20,15 +26,150 @@ joined(const std::vector<std::string>& words)
   return line;
 }
 
+/// The numbers of an option, whatever the locale; commas and blanks between them.
+/// \throw CLI::ValidationError when they are not exactly `n` finite numbers.
+std::vector<double>
+numbersOf(const std::string& option,
+          const std::vector<std::string>& words,
+          std::size_t n)
+{
+  std::vector<double> numbers;
+  const auto complain = [&] {
+    throw CLI::ValidationError(option, fmt::format("needs {} numbers", n));
+  };
+  for (const std::string& word : words)
+    for (const std::string& text : CLI::detail::split(word, ',')) {
+      double value = 0.0;
+      const char* end = text.data() + text.size();
+      const auto result = std::from_chars(text.data(), end, value);
+      if (result.ec != std::errc() || result.ptr != end || !std::isfinite(value))
+        complain();
+      numbers.push_back(value);
+    }
+  if (numbers.size() != n)
+    complain();
+  return numbers;
+}
+
+using UseNumbers = std::function<void(const std::vector<double>&)>;
+
+CLI::Option*
+addNumbers(CLI::App& command,
+           const std::string& name,
+           const std::string& type_name,
+           std::size_t n,
+           const UseNumbers& use,
+           const std::string& description)
+{
+  return command
+      .add_option_function<std::vector<std::string>>(
+          name,
+          [name, n, use](const std::vector<std::string>& words) {
+            use(numbersOf(name, words, n));
+          },
+          description)
+      ->type_name(type_name)
+      ->group("Input");
+}
+
+void
+addCameraOptions(CLI::App& command, InputOptions& options)
+{
+  addNumbers(
+      command,
+      "--intrinsics",
+      "FX,FY,CX,CY",
+      4,
+      [&options](const std::vector<double>& v) {
+        if (v[0] <= 0.0 || v[1] <= 0.0)
+          throw CLI::ValidationError("--intrinsics", "FX and FY must be positive");
+        Camera camera;
+        camera.fx = v[0];
+        camera.fy = v[1];
+        camera.cx = v[2];
+        camera.cy = v[3];
+        options.intrinsics = camera;
+      },
+      "Camera of the depth image or cloud in px, in place of the sensor's")
+      ->expected(1);
+  command
+      .add_option_function<double>(
+          "--depth-scale",
+          [&options](double scale) {
+            options.depth_scale = scale;
+            options.depth_scale_given = true;
+          },
+          "Pixel units per metre of depth images: 1000 for mm, 5000 for TUM")
+      ->check(positiveNumber("1/m"))
+      ->type_name("")
+      ->default_str("1000")
+      ->group("Input");
+}
+
+void
+addFrameOptions(CLI::App& command, InputOptions& options)
+{
+  static const Choices<double> kUnits{{"m", 1.0},
+                                      {"mm", 1e-3},
+                                      {"cm", 1e-2},
+                                      {"um", 1e-6}};
+  static const Choices<CloudAxes> kAxes{{"x-right,y-down,z-forward", CloudAxes::Camera},
+                                        {"opengl", CloudAxes::OpenGl},
+                                        {"ros", CloudAxes::Ros}};
+  addChoice(command,
+            "--unit",
+            options.unit_m,
+            kUnits,
+            "Unit of the coordinates in the file; results are in m")
+      ->default_str("m")
+      ->group("Input");
+  addChoice(command,
+            "--axes",
+            options.axes,
+            kAxes,
+            "Axes of the sensor: opengl is x right, y up, z back; ros is x forward, y "
+            "left, z up")
+      ->default_str("x-right,y-down,z-forward")
+      ->group("Input");
+  addNumbers(
+      command,
+      "--sensor-pose",
+      "X Y Z QW QX QY QZ",
+      7,
+      [&options](const std::vector<double>& v) {
+        const Eigen::Quaterniond q(v[3], v[4], v[5], v[6]);
+        if (!(q.norm() > 1e-6))
+          throw CLI::ValidationError("--sensor-pose", "the quaternion is zero");
+        options.sensor_pose =
+            Pose{q.normalized().toRotationMatrix(), Eigen::Vector3d(v[0], v[1], v[2])};
+      },
+      "Where the sensor stood in the frame of the cloud, m, in place of the file's "
+      "viewpoint")
+      ->expected(7);
+  addNumbers(
+      command,
+      "--viewpoint",
+      "X Y Z",
+      3,
+      [&options](const std::vector<double>& v) {
+        options.viewpoint = Eigen::Vector3d(v[0], v[1], v[2]);
+      },
+      "The position of the sensor alone, m")
+      ->expected(3);
+  exclude(command, "--viewpoint", {"--sensor-pose"});
+}
+
 } // namespace
 
 void
 addInputOptions(CLI::App& command, InputOptions& options)
 {
   command
-      .add_option("CLOUD",
-                  options.clouds,
-                  "PCD, PLY or 16-bit depth PNG/PGM, or a folder: every cloud in it")
+      .add_option(
+          "CLOUD",
+          options.clouds,
+          "PCD, PLY or 16-bit depth PNG/PGM, - for standard input, or a folder: "
+          "every cloud in it")
       ->required();
   addSensorOptions(command, options);
 }
@@ -50,18 +191,15 @@ void
 addSensorOptions(CLI::App& command, InputOptions& options)
 {
   addSensorOption(command, options.sensor_name);
+  addCameraOptions(command, options);
+  addFrameOptions(command, options);
   command
-      .add_option_function<double>(
-          "--depth-scale",
-          [&options](double scale) {
-            options.depth_scale = scale;
-            options.depth_scale_given = true;
-          },
-          "Pixel units per metre of depth images: 1000 for mm, 5000 for TUM; other "
-          "formats are in metres")
-      ->check(positiveNumber("1/m"))
-      ->type_name("")
-      ->default_str("1000")
+      .add_option("--max-points",
+                  options.max_points,
+                  "Refuse a cloud that announces more points than this")
+      ->check(CLI::PositiveNumber)
+      ->type_name("N")
+      ->capture_default_str()
       ->group("Input");
 }
 
@@ -76,12 +214,33 @@ loadSensorOption(const std::string& name)
   }
 }
 
+Sensor
+sensorOf(const CloudFileInfo& info, const Sensor& nominal)
+{
+  Sensor sensor = nominal;
+  if (info.camera)
+    sensor.camera = *info.camera;
+  return sensor;
+}
+
 LoadOptions
 loadOptions(const InputOptions& options, const Sensor& sensor)
 {
   LoadOptions load;
   load.depth_scale = options.depth_scale;
-  load.camera = sensor.camera;
+  load.depth_scale_given = options.depth_scale_given;
+  load.camera = options.intrinsics.value_or(sensor.camera);
+  load.camera_given = options.intrinsics.has_value();
+  load.camera_name = "the sensor " + sensor.name;
+  if (load.camera_given) { // the size of a cloud without a grid is the sensor's
+    load.camera.width = sensor.camera.width;
+    load.camera.height = sensor.camera.height;
+  }
+  load.unit_m = options.unit_m.value_or(1.0);
+  load.axes = options.axes;
+  load.sensor_pose = options.sensor_pose;
+  load.viewpoint = options.viewpoint;
+  load.max_points = options.max_points;
   load.min_range_m = sensor.min_range_m;
   load.max_range_m = sensor.max_range_m;
   return load;
@@ -91,9 +250,10 @@ std::vector<std::string>
 inputNotices(const InputOptions& options, const CloudFileInfo& info)
 {
   std::vector<std::string> notices = info.notices;
-  const bool is_depth_image = info.fields == std::vector<std::string>{"depth"};
-  if (options.depth_scale_given && !is_depth_image)
+  if (options.depth_scale_given && !info.is_depth_image)
     notices.emplace_back("no depth image: --depth-scale does not apply");
+  if (options.unit_m && info.is_depth_image)
+    notices.emplace_back("a depth image: --depth-scale applies, not --unit");
   return notices;
 }
 

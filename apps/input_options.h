@@ -6,6 +6,8 @@
 
 #include <CLI/App.hpp>
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,12 +18,19 @@ struct InputOptions {
   std::string sensor_name = "kinect_v1";
   double depth_scale = 1000.0;
   bool depth_scale_given = false;
+  std::optional<Camera> intrinsics; ///< fx, fy, cx and cy alone
+  std::optional<double> unit_m;
+  std::optional<CloudAxes> axes;
+  std::optional<Pose> sensor_pose;
+  std::optional<Eigen::Vector3d> viewpoint;
+  std::uint64_t max_points = LoadOptions{}.max_points;
 };
 
-/// Adds CLOUD..., --sensor and --depth-scale. `options` must outlive the parsing.
+/// Adds CLOUD... and what addSensorOptions() adds. `options` must outlive the parsing.
 void addInputOptions(CLI::App& command, InputOptions& options);
 
-/// Adds --sensor and --depth-scale.
+/// Adds --sensor and what says how a cloud is to be read: --depth-scale, --intrinsics,
+/// --unit, --axes, --sensor-pose, --viewpoint, --max-points.
 void addSensorOptions(CLI::App& command, InputOptions& options);
 
 /// Adds --sensor alone. `name` must outlive the parsing.
@@ -29,6 +38,10 @@ void addSensorOption(CLI::App& command, std::string& name);
 
 /// \throw CLI::ValidationError when there is no such sensor.
 Sensor loadSensorOption(const std::string& name);
+
+/// The sensor with the camera that the caller gave or that was assumed for a depth
+/// image.
+Sensor sensorOf(const CloudFileInfo& info, const Sensor& nominal);
 
 LoadOptions loadOptions(const InputOptions& options, const Sensor& sensor);
 

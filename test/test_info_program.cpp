@@ -68,6 +68,121 @@ TEST(InfoProgram, BadFilesDoNotStopTheOthers)
   EXPECT_NE(run.out.find("good.pcd"), std::string::npos);
 }
 
+TEST(InfoProgram, StandardInput)
+{
+  const std::string folder = freshFolder("info_stdin");
+  saveCloud(folder + "/bowl.pcd", test::bowlCloud(40, 30));
+  const auto run = test::runExecutable(
+      folder,
+      "/bin/sh",
+      {"-c", std::string(HOLDFAST_PROGRAM) + " info - < " + folder + "/bowl.pcd"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(run.out.find("standard input\n"), 0U) << run.out;
+  EXPECT_NE(run.out.find("40 x 30, organized"), std::string::npos) << run.out;
+  const auto empty = test::runExecutable(
+      folder,
+      "/bin/sh",
+      {"-c", std::string(HOLDFAST_PROGRAM) + " info - < /dev/null"});
+  EXPECT_EQ(empty.exit_code, 1);
+  EXPECT_EQ(empty.errorLines(), 1) << empty.err;
+}
+
+TEST(InfoProgram, SaysWhatWasApplied)
+{
+  const std::string folder = freshFolder("info_applied");
+  test::writeFile(folder + "/mm.pcd",
+                  "VERSION 0.7\nFIELDS x y z\nWIDTH 4\nDATA ascii\n"
+                  "10 20 -1000\n30 -40 -1500\n0 0 0\n0 0 0\n");
+  const std::vector<std::string> words{"info",
+                                       folder + "/mm.pcd",
+                                       "--unit",
+                                       "mm",
+                                       "--axes",
+                                       "opengl"};
+  const auto text = runProgram(folder, words);
+  ASSERT_EQ(text.exit_code, 0) << text.err;
+  for (const std::string part : {"2 valid points, 50.0 % invalid",
+                                 "depth        1.000 to 1.500 m",
+                                 "unit         0.001 m",
+                                 "axes         opengl",
+                                 "2 points at the sensor are taken as invalid"})
+    EXPECT_NE(text.out.find(part), std::string::npos) << part << "\n" << text.out;
+  std::vector<std::string> as_json = words;
+  as_json.insert(as_json.end(), {"--json", "-", "--sensor-pose"});
+  for (const char* number : {"-0.5", "0.1", "2", "1", "0", "0", "0"})
+    as_json.emplace_back(number);
+  const auto run = runProgram(folder, as_json);
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const Json json = Json::parse(run.out);
+  EXPECT_EQ(json["unit_m"], 1e-3);
+  EXPECT_EQ(json["axes"], "opengl");
+  EXPECT_EQ(json["invalid_points"], 2);
+  EXPECT_EQ(json["zero_points"], 2);
+  EXPECT_EQ(json["sensor_pose"]["position"], (std::vector<double>{-0.5, 0.1, 2.0}));
+  EXPECT_EQ(json["viewpoint"], Json());
+  EXPECT_EQ(json["offset"], (std::vector<double>{0.0, 0.0, 0.0}));
+}
+
+TEST(InfoProgram, TheCameraOfAnImageIsSaid)
+{
+  const std::string folder = freshFolder("info_camera");
+  test::writeFile(folder + "/depth.pgm", test::pgmBytes(test::bowlCloud(40, 30), 1000));
+  const auto assumed = runProgram(folder, {"info", folder + "/depth.pgm"});
+  ASSERT_EQ(assumed.exit_code, 0) << assumed.err;
+  EXPECT_NE(assumed.out.find("camera assumed: fx 36.0"), std::string::npos)
+      << assumed.out;
+  EXPECT_NE(assumed.out.find("from the sensor kinect_v1"), std::string::npos);
+  const auto given = runProgram(folder,
+                                {"info",
+                                 folder + "/depth.pgm",
+                                 "--intrinsics",
+                                 "60,61,19.5,14.5",
+                                 "--json",
+                                 "-"});
+  ASSERT_EQ(given.exit_code, 0) << given.err;
+  const Json json = Json::parse(given.out);
+  EXPECT_EQ(json["camera"]["fy"], 61.0);
+  EXPECT_EQ(given.out.find("assumed"), std::string::npos);
+}
+
+TEST(InfoProgram, WrongInputOptionsAreUsageErrors)
+{
+  const std::string folder = freshFolder("info_usage");
+  saveCloud(folder + "/bowl.pcd", test::bowlCloud(8, 6));
+  const std::string cloud = folder + "/bowl.pcd";
+  const std::vector<std::vector<std::string>> wrong{
+      {"--intrinsics", "525,525,319.5"},
+      {"--intrinsics", "525,0,319.5,239.5"},
+      {"--intrinsics", "a,b,c,d"},
+      {"--unit", "inch"},
+      {"--axes", "up"},
+      {"--viewpoint", "1", "2", "x"},
+      {"--sensor-pose", "0", "0", "0", "0", "0", "0", "0"},
+      {"--max-points", "0"},
+      {"--viewpoint",
+       "0",
+       "0",
+       "1",
+       "--sensor-pose",
+       "0",
+       "0",
+       "0",
+       "1",
+       "0",
+       "0",
+       "0"}};
+  for (const auto& options : wrong) {
+    std::vector<std::string> words{"info", cloud};
+    words.insert(words.end(), options.begin(), options.end());
+    const auto run = runProgram(folder, words);
+    EXPECT_EQ(run.exit_code, 2) << options[0] << ' ' << options[1] << run.err;
+  }
+  const auto many = runProgram(folder, {"info", cloud, "--max-points", "47"});
+  EXPECT_EQ(many.exit_code, 1);
+  EXPECT_EQ(many.errorLines(), 1) << many.err;
+  EXPECT_NE(many.err.find("48 points"), std::string::npos) << many.err;
+}
+
 TEST(InfoProgram, RecordedCloudsHaveTheirKnownIntrinsics)
 {
   const std::string folder = freshFolder("info_recorded");

@@ -27,8 +27,8 @@ constexpr const char* kExamples = R"(Examples:
       patches all over the cloud, as a table
   holdfast fit clouds/ -o results --radius 0.04 --spacing 0.02
       every cloud of a folder; NAME.patches.json, .pcd and .ply for each
-  holdfast fit depth.png --depth-scale 5000 --sensor kinect_v1 --json - > patches.json
-      a depth image in units of 0.2 mm
+  holdfast fit depth.png --depth-scale 5000 --intrinsics 525,525,319.5,239.5 --json -
+      a depth image in units of 0.2 mm by a camera of 525 px, as TUM's are
   holdfast fit can.pcd --whole --surface cylinder --json -
       one cylinder to all points
   holdfast fit floor.pcd --surface plane --boundary rectangle --seeds 200 \
