@@ -185,6 +185,10 @@ TEST_F(CloudDialects, SurplusIsLeftAlone)
   for (int i = 0; i < 500; ++i)
     wide += binaryRows("\1\2\3\4");
   EXPECT_NE(complaint(wide).find("16 bytes of data per point"), std::string::npos);
+  std::string padded = "VERSION 0.7\nFIELDS x y z\nWIDTH 2000\nDATA binary\n";
+  for (int i = 0; i < 500; ++i)
+    padded += binaryRows();
+  EXPECT_EQ(load(padded + std::string(8000, '\0')).notices(), "");
 }
 
 TEST_F(CloudDialects, LineEndsAndMagic)
@@ -352,7 +356,7 @@ TEST_F(CloudDialects, GridsOfPlyFiles)
   EXPECT_EQ((*sparse.cloud.points)(1, 1).getVector3fMap(), kPoints[2]);
   EXPECT_NE(load(asciiPly(grid, kRows + "1 0\n0\n1 1\n0\n1 2\n0\n"))
                 .notices()
-                .find("1 vertices are in no cell"),
+                .find("in no cell of range_grid, left out: 1"),
             std::string::npos);
   EXPECT_NE(complaint(asciiPly(grid, kRows + "1 0\n0\n1 1\n0\n1 2\n1 4\n")), "");
   EXPECT_NE(complaint(asciiPly(grid, kRows + "1 0\n0\n1 1\n0\n1 2\n")), "");

@@ -219,8 +219,9 @@ noteCoarseCoordinates(io::RawCloud& cloud)
   const double step_m = std::ldexp(largest, -23);
   if (step_m >= 1e-4)
     cloud.info.notices.push_back(
-        fmt::format("coordinates up to {:.0f} m are only kept to {:.1g} m: move the "
-                    "cloud towards the origin",
+        fmt::format("coordinates up to {:.0f} m are only kept to {:.1g} m: if they are "
+                    "in another unit, --unit says so, else move the cloud towards the "
+                    "origin",
                     largest,
                     step_m));
 }

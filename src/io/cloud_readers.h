@@ -93,7 +93,16 @@ struct ScalarType {
   bool isValid() const;
 
   /// Value at `bytes`, unaligned; `swap` reverses the byte order first.
-  double read(const char* bytes, bool swap = false) const;
+  double read(const char* bytes, bool swap = false) const
+  {
+    if (kind != 'F' || size != 4 || swap)
+      return readOther(bytes, swap);
+    float value; // nearly every value of a cloud
+    std::memcpy(&value, bytes, sizeof(value));
+    return static_cast<double>(value);
+  }
+
+  double readOther(const char* bytes, bool swap) const;
 };
 
 } // namespace holdfast::io

@@ -484,22 +484,33 @@ readAscii(std::string_view data,
       cloud);
 }
 
-/// Some writers pad with zeros; what else is left over may mean that the header is
-/// wrong.
+/// Some writers pad with zeros.
+bool
+isPadding(std::string_view surplus)
+{
+  return surplus.find_first_not_of('\0') == std::string_view::npos;
+}
+
+void
+noteSurplus(std::string_view surplus, RawCloud& cloud)
+{
+  if (!isPadding(surplus))
+    cloud.info.notices.push_back(
+        fmt::format("{} bytes behind the last point: not used", surplus.size()));
+}
+
+/// Surplus data may mean that the header is wrong.
 void
 judgeSurplus(std::string_view surplus, const Header& header, RawCloud& cloud)
 {
-  if (surplus.find_first_not_of('\0') == std::string_view::npos)
-    return;
   // In a small cloud that may be chance.
   if (header.points >= 1000 && surplus.size() % header.points == 0 &&
-      surplus.size() % header.point_bytes != 0)
+      surplus.size() % header.point_bytes != 0 && !isPadding(surplus))
     throw std::runtime_error(
         fmt::format("corrupt: {} bytes of data per point where the header announces {}",
                     header.point_bytes + surplus.size() / header.points,
                     header.point_bytes));
-  cloud.info.notices.push_back(
-      fmt::format("{} bytes behind the last point: not used", surplus.size()));
+  noteSurplus(surplus, cloud);
 }
 
 /// Points one after the other.
@@ -528,9 +539,9 @@ readBinary(std::string_view data,
       cloud);
 }
 
-/// Two sizes of 32 bits, then the LZF stream.
+/// Two sizes of 32 bits, then the LZF stream. `data` is left at what follows.
 std::vector<char>
-decompress(std::string_view data, std::uint64_t expected)
+decompress(std::string_view& data, std::uint64_t expected)
 {
   constexpr std::size_t kSizes = 8;
   if (data.size() < kSizes)
@@ -554,6 +565,7 @@ decompress(std::string_view data, std::uint64_t expected)
                          static_cast<unsigned int>(uncompressed));
   if (length != uncompressed)
     throw std::runtime_error("corrupt: compressed data cannot be unpacked");
+  data.remove_prefix(compressed);
   return plain;
 }
 
@@ -568,6 +580,7 @@ readCompressed(std::string_view data,
   if (!expected || *expected > 0xffffffffU)
     corrupt("more data than compression allows");
   const std::vector<char> plain = decompress(data, *expected);
+  noteSurplus(data, cloud);
   resize(cloud, header);
   fillPoints(
       wanted,

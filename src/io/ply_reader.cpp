@@ -463,7 +463,7 @@ fillGrid(const std::vector<std::int64_t>& grid, RawCloud& cloud)
   const auto lost = std::count(is_used.begin(), is_used.end(), false);
   if (lost > 0)
     cloud.info.notices.push_back(
-        fmt::format("{} vertices are in no cell of range_grid: left out", lost));
+        fmt::format("vertices in no cell of range_grid, left out: {}", lost));
 }
 
 /// Organizes the points when the file says how.

@@ -170,7 +170,7 @@ ScalarType::isValid() const
 }
 
 double
-ScalarType::read(const char* bytes, bool swap) const
+ScalarType::readOther(const char* bytes, bool swap) const
 {
   char ordered[8];
   std::memcpy(ordered, bytes, static_cast<std::size_t>(size));
