@@ -119,14 +119,6 @@ recoveredJson(const CloudFacts& facts)
   return json;
 }
 
-const char*
-axesName(CloudAxes axes)
-{
-  return axes == CloudAxes::OpenGl ? "opengl" :
-         axes == CloudAxes::Ros    ? "ros" :
-                                     "x-right,y-down,z-forward";
-}
-
 Json
 factsJson(const CloudFacts& facts)
 {

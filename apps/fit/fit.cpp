@@ -121,6 +121,7 @@ extract(const RangeCloud& cloud, const Sensor& sensor, const FitSettings& settin
 /// The cloud of a file with the sensor that took it, and what had to be decided.
 struct Input {
   RangeCloud cloud;
+  CloudFileInfo file;
   Sensor sensor;
   std::vector<std::string> notices;
 };
@@ -129,11 +130,10 @@ Input
 loadInput(const std::string& path, const Sensor& nominal, const FitSettings& settings)
 {
   Input input;
-  CloudFileInfo info;
-  input.cloud = loadCloud(path, loadOptions(settings.input, nominal), &info);
-  input.notices = inputNotices(settings.input, info);
+  input.cloud = loadCloud(path, loadOptions(settings.input, nominal), &input.file);
+  input.notices = inputNotices(settings.input, input.file);
   std::string notice;
-  input.sensor = matchedSensor(nominal, input.cloud, &notice);
+  input.sensor = matchedSensor(sensorOf(input.file, nominal), input.cloud, &notice);
   if (!notice.empty())
     input.notices.push_back(notice);
   if (settings.sigma_m > 0.0)
@@ -157,6 +157,7 @@ fitCloud(const std::string& path,
 
   const Stopwatch loading;
   const Input input = loadInput(path, nominal, settings);
+  report.file = input.file;
   report.sensor_pose = input.cloud.sensor_pose;
   report.offset = input.cloud.offset;
   report.covariances_of_cloud = !input.cloud.covariances.empty();

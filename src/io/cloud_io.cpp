@@ -348,6 +348,9 @@ finish(io::RawCloud& raw, const LoadOptions& options)
   if (countValidPoints(cloud) == 0)
     throw std::runtime_error("has no valid point");
   cloud.sensor_pose = sensorPoseOf(raw, options);
+  // Nobody has to say the identity.
+  cloud.sensor_pose_given = options.sensor_pose || options.viewpoint || options.axes ||
+                            !isIdentity(cloud.sensor_pose);
   info.zero_points += invalidateZeroPoints(points, cloud.sensor_pose);
   cloud.covariances = std::move(raw.covariances);
   const int valid = countValidPoints(cloud);
@@ -464,6 +467,20 @@ io::checkPointCount(std::uint64_t points, std::uint64_t max_points)
         fmt::format("announces {} points, more than --max-points {} allows",
                     points,
                     max_points));
+}
+
+std::string_view
+axesName(CloudAxes axes)
+{
+  switch (axes) {
+  case CloudAxes::Camera:
+    return "x-right,y-down,z-forward";
+  case CloudAxes::OpenGl:
+    return "opengl";
+  case CloudAxes::Ros:
+    return "ros";
+  }
+  return "unknown";
 }
 
 Eigen::Matrix3d

@@ -63,6 +63,17 @@ matrixJson(const ParameterMatrix& m)
   return rows;
 }
 
+Json
+cameraJson(const Camera& camera)
+{
+  return {{"width", camera.width},
+          {"height", camera.height},
+          {"fx", camera.fx},
+          {"fy", camera.fy},
+          {"cx", camera.cx},
+          {"cy", camera.cy}};
+}
+
 /// What the covariances of the points came from.
 std::string
 noiseName(const PatchReport& report)
@@ -76,21 +87,31 @@ Json
 sensorJson(const PatchReport& report)
 {
   const Sensor& sensor = report.result.sensor;
-  const Camera& camera = sensor.camera;
   const Eigen::Quaterniond q(report.sensor_pose.R);
   const Eigen::Vector3d position = report.sensor_pose.c + report.offset;
   return {{"name", sensor.name},
           {"noise", noiseName(report)},
-          {"camera",
-           {{"width", camera.width},
-            {"height", camera.height},
-            {"fx", camera.fx},
-            {"fy", camera.fy},
-            {"cx", camera.cx},
-            {"cy", camera.cy}}},
+          {"camera", cameraJson(sensor.camera)},
           {"position", vectorJson(position)},
           {"orientation_wxyz", {q.w(), q.x(), q.y(), q.z()}},
           {"viewpoint_credible", report.result.viewpoint_is_credible}};
+}
+
+/// How the file was read; turn: from camera axes to those of the file's sensor frame.
+Json
+inputJson(const CloudFileInfo& file)
+{
+  const Eigen::Matrix3d turn = turnFromCamera(file.axes);
+  Json rows = Json::array();
+  for (Eigen::Index i = 0; i < 3; ++i)
+    rows.push_back(vectorJson(turn.row(i)));
+  return {{"format", file.format},
+          {"axes", axesName(file.axes)},
+          {"turn", rows},
+          {"unit_m", file.unit_m},
+          {"zero_points", file.zero_points},
+          {"out_of_range_pixels", file.out_of_range_pixels},
+          {"camera", file.camera ? cameraJson(*file.camera) : Json()}};
 }
 
 Json
@@ -444,6 +465,8 @@ writeJson(std::ostream& out, const PatchReport& report, JsonLayout layout)
   member("cloud", report.cloud);
   if (report.timestamp_us)
     member("timestamp_us", *report.timestamp_us);
+  if (report.file)
+    member("input", inputJson(*report.file));
   member("sensor", sensorJson(report));
   member("offset", vectorJson(report.offset));
   member("cloud_points", pointsJson(report.result.points));

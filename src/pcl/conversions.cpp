@@ -1,5 +1,7 @@
 #include <holdfast/pcl/conversions.h>
 
+#include "zero_points.h"
+
 #include <holdfast/geometry/constants.h>
 
 #include <algorithm>
@@ -102,6 +104,37 @@ sensorPose(const Eigen::Vector4f& sensor_origin,
   pose.c = sensor_origin.head<3>().cast<double>();
   return pose;
 }
+
+namespace detail {
+
+pcl::PointCloud<pcl::PointXYZ>::ConstPtr
+withoutZeroPoints(const pcl::PointCloud<pcl::PointXYZ>::ConstPtr& points,
+                  const Pose& sensor_pose,
+                  int& count)
+{
+  const auto isZero = [](const pcl::PointXYZ& p) {
+    return p.x == 0.0F && p.y == 0.0F && p.z == 0.0F;
+  };
+  if (!points || std::none_of(points->begin(), points->end(), isZero))
+    return points;
+  const auto cleaned = pcl::make_shared<pcl::PointCloud<pcl::PointXYZ>>(*points);
+  count = invalidateZeroPoints(*cleaned, sensor_pose);
+  return cleaned;
+}
+
+void
+noteZeroPoints(int count, std::string* notice)
+{
+  if (count == 0 || notice == nullptr)
+    return;
+  if (!notice->empty())
+    *notice += "; ";
+  *notice += std::to_string(count) +
+             (count == 1 ? " point at the sensor is" : " points at the sensor are") +
+             " taken as invalid";
+}
+
+} // namespace detail
 
 pcl::PointCloud<PointXYZCovariance>
 toPointCloud(const RangeCloud& cloud)

@@ -1,6 +1,7 @@
 /// \file Fitted patches to and from files.
 #pragma once
 
+#include <holdfast/io/cloud_io.h>
 #include <holdfast/pcl/patch_extraction.h>
 
 #include <array>
@@ -16,6 +17,7 @@ namespace holdfast {
 struct PatchReport {
   std::string cloud; ///< file, or frame, the patches come from
   std::optional<std::uint64_t> timestamp_us; ///< of a frame, by the camera's clock
+  std::optional<CloudFileInfo> file; ///< what was said and done when it was read
   Pose sensor_pose;
   Eigen::Vector3d offset = Eigen::Vector3d::Zero(); ///< RangeCloud::offset
   ExtractionOptions options;

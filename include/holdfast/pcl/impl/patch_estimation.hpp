@@ -118,12 +118,12 @@ PatchEstimation<PointInT, PointOutT>::rangeCloud()
 {
   std::string notice;
   RangeCloud cloud = toRangeCloud<PointInT>(uses_search_ ? surface_ : input_, &notice);
+  if (!notice.empty())
+    result_.notices.push_back(notice);
   if (sensor_pose_) {
     cloud.sensor_pose = *sensor_pose_;
     cloud.sensor_pose_given = true;
   }
-  else if (!notice.empty())
-    result_.notices.push_back(notice);
   if (covariances_)
     cloud.covariances = *covariances_;
   return cloud;
