@@ -12,11 +12,13 @@
 namespace holdfast::app {
 
 void addCalibrateCommand(CLI::App& app, int& exit_code);
-void addExperimentCommand(CLI::App& app, int& exit_code);
 void addFitCommand(CLI::App& app, int& exit_code);
 void addInfoCommand(CLI::App& app, int& exit_code);
 void addRenderCommand(CLI::App& app, int& exit_code);
 void addSimulateCommand(CLI::App& app, int& exit_code);
+
+// With HOLDFAST_BUILD_EXPERIMENTS only.
+void addExperimentCommand(CLI::App& app, int& exit_code);
 
 // With OpenNI2 only; in live/.
 void addLiveCommand(CLI::App& app, int& exit_code);

@@ -11,6 +11,20 @@
 
 namespace {
 
+#ifdef HOLDFAST_QUICKSTART
+constexpr const char* kExamples = R"(Examples:
+  holdfast info rocks.pcd                   what is in a cloud
+  holdfast fit rocks.pcd                    patches all over it, as a table
+  holdfast fit rocks.pcd -o results         and as JSON and a coloured mesh
+
+This program was built by samples/quickstart.sh, which leaves out all commands but
+these two. From the folder of the project,
+  cmake -S . -B build -DHOLDFAST_QUICKSTART=OFF && cmake --build build
+builds the others as well: live, record, render, calibrate, simulate, experiment.
+'holdfast COMMAND --help' explains a command.
+Exit codes: 0 all done, 1 something failed, 2 wrong usage.
+)";
+#else
 constexpr const char* kExamples = R"(Examples:
   holdfast simulate rocks -o rocks.pcd      a cloud of a simulated scene
   holdfast info rocks.pcd                   what is in a cloud
@@ -27,6 +41,7 @@ constexpr const char* kExamples = R"(Examples:
 'holdfast COMMAND --help' explains a command.
 Exit codes: 0 all done, 1 something failed, 2 wrong usage.
 )";
+#endif
 
 /// Standard output may be a full disk.
 int
@@ -53,10 +68,14 @@ run(int argc, char** argv)
   holdfast::app::addLiveCommand(app, exit_code);
   holdfast::app::addRecordCommand(app, exit_code);
 #endif
+#ifndef HOLDFAST_QUICKSTART
   holdfast::app::addRenderCommand(app, exit_code);
   holdfast::app::addCalibrateCommand(app, exit_code);
   holdfast::app::addSimulateCommand(app, exit_code);
+#endif
+#ifdef HOLDFAST_HAVE_EXPERIMENTS
   holdfast::app::addExperimentCommand(app, exit_code);
+#endif
   try {
     app.parse(argc, argv);
     return flushed(exit_code);

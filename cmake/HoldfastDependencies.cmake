@@ -1,12 +1,10 @@
 # Everything the libraries and programs stand on; tests and benchmarks add their own.
 
+# ---- core: these, and nothing else ----
+
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
 find_package(Boost 1.74 REQUIRED) # Boost.Math, headers only
 find_package(Threads REQUIRED)
-find_package(fmt 8 REQUIRED)
-find_package(nlohmann_json 3.10 REQUIRED)
-find_package(PNG REQUIRED)
-find_package(yaml-cpp REQUIRED)
 
 # The fit kernel in vectors of whatever the processor has; without it the same
 # formulas run in plain C++.
@@ -16,20 +14,42 @@ if(HOLDFAST_WITH_HIGHWAY)
   find_package(hwy REQUIRED)
 endif()
 
+find_package(benchmark QUIET)
+if(benchmark_FOUND AND PROJECT_IS_TOP_LEVEL)
+  option(HOLDFAST_BUILD_BENCHMARKS "Build holdfast_benchmark" ON)
+else()
+  option(HOLDFAST_BUILD_BENCHMARKS "Build holdfast_benchmark" OFF)
+endif()
+
+# ---- pcl: the classes beside PCL's, files, and all programs ----
+
 # Asking for more components (features, io, surface, segmentation) would pull in VTK
 # and Qt. What we use of pcl_io and pcl_segmentation needs neither, so they are linked by
 # name.
 set(HOLDFAST_PCL_COMPONENTS common kdtree search octree sample_consensus filters)
+if(NOT DEFINED HOLDFAST_WITH_PCL)
+  find_package(PCL 1.12 QUIET COMPONENTS ${HOLDFAST_PCL_COMPONENTS})
+endif()
+option(HOLDFAST_WITH_PCL "Classes for PCL, files, programs" ${PCL_FOUND})
+if(NOT HOLDFAST_WITH_PCL)
+  # Plain variables, which go before the options of the same names.
+  foreach(part BUILD_APPS BUILD_SAMPLES BUILD_BENCHMARKS BUILD_EXPERIMENTS
+      WITH_OPENNI2 WITH_VIEWER)
+    set(HOLDFAST_${part} OFF)
+  endforeach()
+  return()
+endif()
+
 find_package(PCL 1.12 REQUIRED COMPONENTS ${HOLDFAST_PCL_COMPONENTS})
 find_library(HOLDFAST_PCL_IO_LIBRARY pcl_io HINTS ${PCL_LIBRARY_DIRS} REQUIRED)
 find_library(HOLDFAST_PCL_SEGMENTATION_LIBRARY pcl_segmentation
   HINTS ${PCL_LIBRARY_DIRS} REQUIRED)
 mark_as_advanced(HOLDFAST_PCL_IO_LIBRARY HOLDFAST_PCL_SEGMENTATION_LIBRARY)
 
-# PCL's own estimates, which programs, tests and benchmarks compare ours with.
-find_library(HOLDFAST_PCL_FEATURES_LIBRARY pcl_features HINTS ${PCL_LIBRARY_DIRS}
-  REQUIRED)
-mark_as_advanced(HOLDFAST_PCL_FEATURES_LIBRARY)
+find_package(fmt 8 REQUIRED)
+find_package(nlohmann_json 3.10 REQUIRED)
+find_package(PNG REQUIRED)
+find_package(yaml-cpp REQUIRED)
 
 # Live cameras and .oni recordings.
 find_package(PkgConfig QUIET)
@@ -41,23 +61,26 @@ if(HOLDFAST_WITH_OPENNI2 AND NOT OPENNI2_FOUND)
   message(FATAL_ERROR "HOLDFAST_WITH_OPENNI2 needs pkg-config and libopenni2-dev")
 endif()
 
-# The window of `holdfast live --view`.
-find_package(VTK QUIET COMPONENTS CommonCore CommonDataModel RenderingCore)
-find_package(X11 QUIET)
-if(VTK_FOUND AND X11_FOUND)
-  set(viewer_found ON)
-else()
-  set(viewer_found OFF)
+# The window of `holdfast live --view`. Not looked for where it is not wanted: finding
+# VTK takes seconds.
+if(NOT DEFINED HOLDFAST_WITH_VIEWER OR HOLDFAST_WITH_VIEWER)
+  find_package(VTK QUIET COMPONENTS CommonCore CommonDataModel RenderingCore)
+  find_package(X11 QUIET)
+  if(VTK_FOUND AND X11_FOUND)
+    set(viewer_found ON)
+  else()
+    set(viewer_found OFF)
+  endif()
+  option(HOLDFAST_WITH_VIEWER "A window for holdfast live" ${viewer_found})
 endif()
-option(HOLDFAST_WITH_VIEWER "A window for holdfast live" ${viewer_found})
 
 if(HOLDFAST_BUILD_APPS)
   find_package(CLI11 REQUIRED)
 endif()
 
-find_package(benchmark QUIET)
-if(benchmark_FOUND AND PROJECT_IS_TOP_LEVEL)
-  option(HOLDFAST_BUILD_BENCHMARKS "Build holdfast_benchmark" ON)
-else()
-  option(HOLDFAST_BUILD_BENCHMARKS "Build holdfast_benchmark" OFF)
+# PCL's own estimates, which programs, tests and benchmarks compare ours with.
+if(HOLDFAST_BUILD_EXPERIMENTS OR HOLDFAST_BUILD_TESTS OR HOLDFAST_BUILD_BENCHMARKS)
+  find_library(HOLDFAST_PCL_FEATURES_LIBRARY pcl_features HINTS ${PCL_LIBRARY_DIRS}
+    REQUIRED)
+  mark_as_advanced(HOLDFAST_PCL_FEATURES_LIBRARY)
 endif()

@@ -3,8 +3,14 @@ include(CMakePackageConfigHelpers)
 
 set(config_dir ${CMAKE_INSTALL_LIBDIR}/cmake/holdfast)
 
+set(components core)
+if(HOLDFAST_WITH_PCL)
+  list(APPEND components pcl)
+else()
+  set(not_built REGEX "holdfast/(pcl|io)$" EXCLUDE)
+endif()
 if(NOT HOLDFAST_WITH_OPENNI2)
-  set(not_built PATTERN openni2_grabber.h EXCLUDE)
+  list(APPEND not_built PATTERN openni2_grabber.h EXCLUDE)
 endif()
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/include/ ${PROJECT_BINARY_DIR}/include/
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} ${not_built})
@@ -19,7 +25,7 @@ if(TARGET holdfast)
 endif()
 
 # One export set per component: core must be usable where PCL is not installed.
-foreach(component core pcl)
+foreach(component IN LISTS components)
   install(TARGETS holdfast_${component} EXPORT holdfast_${component}Targets)
   install(EXPORT holdfast_${component}Targets
     NAMESPACE holdfast::

@@ -3,6 +3,10 @@
 option(HOLDFAST_BUILD_APPS "Build the program holdfast" ${PROJECT_IS_TOP_LEVEL})
 option(HOLDFAST_BUILD_TESTS "Build the tests" ${PROJECT_IS_TOP_LEVEL})
 option(HOLDFAST_BUILD_SAMPLES "Build the programs in samples/" ${PROJECT_IS_TOP_LEVEL})
+option(HOLDFAST_BUILD_EXPERIMENTS "The sub-command holdfast experiment"
+  ${PROJECT_IS_TOP_LEVEL})
+option(HOLDFAST_QUICKSTART "Only what the first look needs; see HoldfastQuickstart" OFF)
+include(HoldfastQuickstart)
 option(HOLDFAST_WERROR "Treat warnings as errors" OFF)
 set(HOLDFAST_SANITIZE "" CACHE STRING "Sanitizers, e.g. address;undefined or thread")
 
@@ -33,4 +37,26 @@ function(holdfast_set_warnings target)
   target_compile_options(${target} PRIVATE
     -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
     $<$<BOOL:${HOLDFAST_WERROR}>:-Werror>)
+endfunction()
+
+# Most of a source file's compile time goes into the headers of PCL, Eigen and CLI11.
+# A compiler cache finds nothing again behind a precompiled header unless it is told to
+# be sloppy, so the default is one or the other.
+if(CMAKE_CXX_COMPILER_LAUNCHER)
+  set(precompile OFF)
+else()
+  set(precompile ON)
+endif()
+option(HOLDFAST_PRECOMPILE_HEADERS "Compile common headers once per target" ${precompile})
+
+# holdfast_precompile(TARGET header...) or (TARGET REUSE_FROM other).
+function(holdfast_precompile target)
+  if(NOT HOLDFAST_PRECOMPILE_HEADERS)
+    return()
+  endif()
+  if(ARGV1 STREQUAL REUSE_FROM)
+    target_precompile_headers(${target} REUSE_FROM ${ARGV2})
+  else()
+    target_precompile_headers(${target} PRIVATE ${ARGN})
+  endif()
 endfunction()

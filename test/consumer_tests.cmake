@@ -34,6 +34,7 @@ function(add_consumer_test name flags)
         -DCMAKE_CXX_COMPILER=${CMAKE_CXX_COMPILER}
         -DCMAKE_CXX_COMPILER_LAUNCHER=${CMAKE_CXX_COMPILER_LAUNCHER}
         "-DCMAKE_CXX_FLAGS=${flags} ${sanitizer_flag}"
+        -DWITH_PCL=${HOLDFAST_WITH_PCL}
       --test-command ${CMAKE_CTEST_COMMAND} --output-on-failure)
   set_tests_properties(${name} PROPERTIES FIXTURES_REQUIRED installed TIMEOUT 600)
 endfunction()

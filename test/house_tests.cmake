@@ -15,6 +15,21 @@ add_test(NAME include_direction_finds_violations
 set_tests_properties(include_direction_finds_violations PROPERTIES PASS_REGULAR_EXPRESSION
   "fit must not include sensor.*must not include <pcl|must not include <pcl.*fit must not include sensor")
 
+# Every public header compiles alone, those of the core where PCL is not installed.
+get_target_property(core_dirs Eigen3::Eigen INTERFACE_INCLUDE_DIRECTORIES)
+set(header_dirs ${PROJECT_SOURCE_DIR}/include ${PROJECT_BINARY_DIR}/include)
+add_test(NAME headers_compile_alone
+  COMMAND ${support}/check_headers.sh ${CMAKE_CXX_COMPILER}
+    "${header_dirs};${core_dirs}" "${PCL_INCLUDE_DIRS}")
+set_tests_properties(headers_compile_alone PROPERTIES TIMEOUT 900)
+
+# A header that leans on what others include is found.
+file(WRITE ${bad_tree}/alone/holdfast/bad.h "inline std::string name();\n")
+add_test(NAME headers_compile_alone_finds_violations
+  COMMAND ${support}/check_headers.sh ${CMAKE_CXX_COMPILER} ${bad_tree}/alone "")
+set_tests_properties(headers_compile_alone_finds_violations PROPERTIES
+  PASS_REGULAR_EXPRESSION "holdfast/bad.h does not compile alone")
+
 add_test(NAME package_setup COMMAND ${support}/check_setup.sh)
 
 add_test(NAME readme_snippet COMMAND ${support}/check_readme.sh)

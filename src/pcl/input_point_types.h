@@ -3,6 +3,9 @@
 
 #include <holdfast/pcl/point_types.h>
 
-#define HOLDFAST_INPUT_POINT_TYPES                                      \
-  (pcl::PointXYZ)(pcl::PointXYZI)(pcl::PointXYZRGB)(pcl::PointXYZRGBA)( \
-      pcl::PointNormal)(holdfast::PointXYZCovariance)
+// All but the plain one, which the program uses: sources that the quick start leaves
+// out compile these.
+#define HOLDFAST_OTHER_POINT_TYPES                                         \
+  (pcl::PointXYZI)(pcl::PointXYZRGB)(pcl::PointXYZRGBA)(pcl::PointNormal)( \
+      holdfast::PointXYZCovariance)
+#define HOLDFAST_INPUT_POINT_TYPES (pcl::PointXYZ) HOLDFAST_OTHER_POINT_TYPES

@@ -1,8 +1,8 @@
-#include <holdfast/pcl/impl/patch_estimation.hpp>
-
+#include "compiled_searches.h"
 #include "input_point_types.h"
+
+#include <holdfast/pcl/impl/patch_estimation.hpp>
 
 #include <pcl/impl/instantiate.hpp>
 
-PCL_INSTANTIATE_PRODUCT(PatchEstimation,
-                        (HOLDFAST_INPUT_POINT_TYPES)((holdfast::PatchPoint)))
+PCL_INSTANTIATE_PRODUCT(PatchEstimation, ((pcl::PointXYZ))((holdfast::PatchPoint)))

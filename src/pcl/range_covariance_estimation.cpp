@@ -1,9 +1,11 @@
-#include <holdfast/pcl/impl/range_covariance_estimation.hpp>
+#include <holdfast/pcl/range_covariance_estimation.h>
 
-#include "input_point_types.h"
 #include "point_gatherer.h"
 
-#include <pcl/impl/instantiate.hpp>
+#include <pcl/common/point_tests.h>
+
+#include <algorithm>
+#include <limits>
 
 namespace holdfast {
 
@@ -40,6 +42,3 @@ rangeCovariances(const RangeCloud& cloud,
 }
 
 } // namespace holdfast
-
-PCL_INSTANTIATE_PRODUCT(RangeCovarianceEstimation,
-                        (HOLDFAST_INPUT_POINT_TYPES)((holdfast::PointXYZCovariance)))

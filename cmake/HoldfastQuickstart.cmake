@@ -1,0 +1,33 @@
+# What a first look does without, and what samples/quickstart.sh therefore does not
+# compile: all but `holdfast fit` and `holdfast info`, the noise calibration, simulator
+# and evaluation, two covariance modes, and the classes for PCL pipelines.
+
+# Plain variables go before the options of the same names, and leave a later build in
+# the same folder as it would have been.
+if(HOLDFAST_QUICKSTART)
+  foreach(part BUILD_TESTS BUILD_SAMPLES BUILD_BENCHMARKS BUILD_EXPERIMENTS
+      WITH_OPENNI2 WITH_VIEWER)
+    set(HOLDFAST_${part} OFF)
+  endforeach()
+endif()
+
+set(quickstart_without
+  src/simulation/ src/evaluation/ src/sensor/noise_calibration
+  src/uncertainty/stagewise src/uncertainty/second_order
+  src/pcl/point_types src/pcl/patch_estimation_types src/pcl/range_covariance
+  src/pcl/sac_ src/pcl/patch_segmentation src/pcl/transforms src/pcl/frame_extraction
+  src/io/range_frame
+  apps/calibrate/ apps/render/ apps/simulate.cpp apps/plot.cpp)
+# What stands in for them where the rest calls them.
+set(quickstart_instead src/uncertainty/quickstart/left_out_modes.cpp)
+
+# Takes from a list of sources what the quick start does without.
+function(holdfast_filter_sources list)
+  set(kept ${${list}})
+  if(HOLDFAST_QUICKSTART)
+    foreach(part IN LISTS quickstart_without)
+      list(FILTER kept EXCLUDE REGEX "^${PROJECT_SOURCE_DIR}/${part}")
+    endforeach()
+  endif()
+  set(${list} ${kept} PARENT_SCOPE)
+endfunction()
