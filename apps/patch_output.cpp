@@ -19,7 +19,7 @@ checkFolder(const std::string& folder)
   while (!fs::exists(existing, ignored) && existing.has_relative_path())
     existing = existing.parent_path();
   if (!fs::is_directory(existing, ignored))
-    throw std::runtime_error(existing.string() + ": is no folder");
+    throw std::runtime_error(existing.string() + ": is not a folder");
   if (::access(existing.c_str(), W_OK | X_OK) != 0)
     throw std::runtime_error(existing.string() + ": cannot be written to");
 }
@@ -46,9 +46,7 @@ writePatchFiles(const PatchReport& report,
   writeJson(json.stream(), report, JsonLayout::PatchPerLine);
   writePatchPoints(points.stream(), report.result.patches, report.sensor_pose);
   writeMesh(mesh.stream(), report.result.patches, false, report.offset);
-  points.commit();
-  mesh.commit();
-  json.commit();
+  AtomicFile::commit(std::vector<AtomicFile*>{&points, &mesh, &json});
 }
 
 } // namespace holdfast::app

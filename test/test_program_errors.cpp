@@ -209,8 +209,8 @@ TEST_F(ProgramErrors, WholeThatFailsNamesTheStatus)
 TEST_F(ProgramErrors, UnwritableOutput)
 {
   const std::string file = write("file", "in the way");
-  expectError(1, {good_, "-o", file}, "file: is no folder");
-  expectError(1, {good_, "-o", file + "/below"}, "file: is no folder");
+  expectError(1, {good_, "-o", file}, "file: is not a folder");
+  expectError(1, {good_, "-o", file + "/below"}, "file: is not a folder");
   expectError(1, {good_, "--json", folder_ + "/no/patches.json"}, "cannot be written");
   expectError(1, {good_, "--json", folder_}, "is a directory");
   expectError(1, {good_, "--json", "/dev/full", "--quiet"}, "/dev/full: ");
