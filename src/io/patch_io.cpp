@@ -1,6 +1,9 @@
+#include <holdfast/fit/names.h>
 #include <holdfast/io/patch_io.h>
 #include <holdfast/patch/tessellation.h>
 #include <holdfast/pcl/conversions.h>
+#include <holdfast/pcl/names.h>
+#include <holdfast/validation/names.h>
 #include <holdfast/version.h>
 
 #include <nlohmann/json.hpp>
@@ -20,29 +23,6 @@ namespace holdfast {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-constexpr std::array<std::string_view, 9> kSurfaceRequests{"auto",
-                                                           "paraboloid",
-                                                           "plane",
-                                                           "sphere",
-                                                           "circular_cylinder",
-                                                           "elliptic_paraboloid",
-                                                           "hyperbolic_paraboloid",
-                                                           "cylindric_paraboloid",
-                                                           "circular_paraboloid"};
-constexpr std::array<std::string_view, 4> kNeighborhoods{"disc",
-                                                         "ball",
-                                                         "geodesic",
-                                                         "knn"};
-constexpr std::array<std::string_view, 3> kSeedStrategies{"grid", "random", "poisson"};
-constexpr std::array<std::string_view, 2> kResiduals{"sampson", "ray"};
-
-template <std::size_t N, typename Enum>
-std::string_view
-nameOf(const std::array<std::string_view, N>& names, Enum value)
-{
-  return names.at(static_cast<std::size_t>(value));
-}
 
 template <typename Derived>
 Json
@@ -137,12 +117,12 @@ limitJson(T limit)
 Json
 samplerJson(const SamplerOptions& sampler)
 {
-  Json json = {{"neighborhood", nameOf(kNeighborhoods, sampler.neighborhood)}};
+  Json json = {{"neighborhood", kNeighborhoodNames.of(sampler.neighborhood)}};
   if (sampler.neighborhood == Neighborhood::Knn)
     json["k"] = sampler.k;
   else
     json["radius"] = sampler.radius_m;
-  json["seed_strategy"] = nameOf(kSeedStrategies, sampler.strategy);
+  json["seed_strategy"] = kSeedStrategyNames.of(sampler.strategy);
   json["seeds"] = limitJson(sampler.max_seeds);
   json["spacing"] = sampler.spacing_m;
   json["max_patches"] = limitJson(sampler.max_patches);
@@ -178,13 +158,13 @@ optionsJson(const PatchReport& report)
   const FitOptions& fit = report.options.fit;
   return {{"whole", report.whole},
           {"sampler", report.whole ? Json() : samplerJson(report.options.sampler)},
-          {"surface", nameOf(kSurfaceRequests, fit.surface)},
+          {"surface", kSurfaceRequestNames.of(fit.surface)},
           {"boundary",
            fit.plane_boundary ? Json(boundaryName(*fit.plane_boundary)) : Json()},
           {"containment", fit.containment},
           {"curvature_tolerance", fit.curvature_tolerance_per_m},
           {"discrimination_level", fit.discrimination_level},
-          {"residual", nameOf(kResiduals, fit.residual)},
+          {"residual", kResidualNames.of(fit.residual)},
           {"debias_scatter", fit.debias_scatter},
           {"noise_at_surface", fit.noise_at_surface},
           {"normal_from_pca", fit.normal_from_pca},
@@ -260,29 +240,6 @@ text(const Json& json)
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-/// The enumerator up to `last` that nameOf() calls so.
-template <typename Enum, typename NameOf>
-std::optional<Enum>
-fromName(const std::string& name, Enum last, const NameOf& nameOf)
-{
-  for (int i = 0; i <= static_cast<int>(last); ++i)
-    if (nameOf(static_cast<Enum>(i)) == name)
-      return static_cast<Enum>(i);
-  return std::nullopt;
-}
-
-std::optional<FitStatus>
-statusFromName(const std::string& name)
-{
-  return fromName(name, FitStatus::NonFinite, statusName);
-}
-
-std::optional<PatchVerdict>
-verdictFromName(const std::string& name)
-{
-  return fromName(name, PatchVerdict::ChiSquareTooLarge, verdictName);
-}
-
 template <typename Enum>
 Enum
 known(const std::optional<Enum>& value, const std::string& name)
@@ -296,10 +253,10 @@ void
 readRejected(const Json& json, ExtractionResult& result)
 {
   for (const auto& [name, count] : json.items()) {
-    if (const auto status = statusFromName(name))
+    if (const auto status = kStatusNames.find(name))
       result.rejected[*status] = count;
     else
-      result.turned_down[known(verdictFromName(name), name)] = count;
+      result.turned_down[known(kVerdictNames.find(name), name)] = count;
   }
 }
 
@@ -348,7 +305,7 @@ patchFromJson(const Json& json)
   FitResult& fit = extracted.fit;
   readNumbers(json, fit);
   const std::string status = json.at("status");
-  fit.status = known(statusFromName(status), status);
+  fit.status = known(kStatusNames.find(status), status);
   fit.points = json.at("points");
   fit.chi2 = number(json.at("chi2"));
   fit.chi2_dof = json.at("chi2_dof");

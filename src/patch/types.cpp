@@ -1,36 +1,9 @@
+#include <holdfast/patch/names.h>
 #include <holdfast/patch/types.h>
 
 #include <algorithm>
 
 namespace holdfast {
-namespace {
-
-constexpr std::array<std::string_view, 7> kSurfaceNames{"plane",
-                                                        "sphere",
-                                                        "circular_cylinder",
-                                                        "elliptic_paraboloid",
-                                                        "hyperbolic_paraboloid",
-                                                        "cylindric_paraboloid",
-                                                        "circular_paraboloid"};
-
-constexpr std::array<std::string_view, 4> kBoundaryNames{"ellipse",
-                                                         "circle",
-                                                         "rectangle",
-                                                         "quad"};
-
-// The enumerator whose name is at the same place in the table.
-template <typename Enum, std::size_t N>
-std::optional<Enum>
-fromName(const std::array<std::string_view, N>& names, std::string_view name)
-{
-  const auto found = std::find(names.begin(), names.end(), name);
-  if (found == names.end())
-    return std::nullopt;
-  return static_cast<Enum>(found - names.begin());
-}
-
-} // namespace
-
 bool
 isLegal(PatchType type)
 {
@@ -120,25 +93,25 @@ degreesOfFreedom(PatchType type)
 std::string_view
 surfaceName(SurfaceType surface)
 {
-  return kSurfaceNames.at(static_cast<std::size_t>(surface));
+  return kSurfaceNames.of(surface);
 }
 
 std::string_view
 boundaryName(BoundaryType boundary)
 {
-  return kBoundaryNames.at(static_cast<std::size_t>(boundary));
+  return kBoundaryNames.of(boundary);
 }
 
 std::optional<SurfaceType>
 surfaceFromName(std::string_view name)
 {
-  return fromName<SurfaceType>(kSurfaceNames, name);
+  return kSurfaceNames.find(name);
 }
 
 std::optional<BoundaryType>
 boundaryFromName(std::string_view name)
 {
-  return fromName<BoundaryType>(kBoundaryNames, name);
+  return kBoundaryNames.find(name);
 }
 
 } // namespace holdfast

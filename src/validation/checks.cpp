@@ -1,17 +1,11 @@
 #include <holdfast/validation/checks.h>
+#include <holdfast/validation/names.h>
 
 #include <array>
 #include <stdexcept>
 
 namespace holdfast {
 namespace {
-
-constexpr std::array<std::string_view, 6> kVerdictNames{"accepted",
-                                                        "not_usable",
-                                                        "curvature_too_large",
-                                                        "residual_too_large",
-                                                        "coverage_too_low",
-                                                        "chi_square_too_large"};
 
 // Written so that what is not a number does not pass.
 bool
@@ -78,7 +72,7 @@ validityError(const ValidationOptions& options)
 std::string_view
 verdictName(PatchVerdict verdict)
 {
-  return kVerdictNames.at(static_cast<std::size_t>(verdict));
+  return kVerdictNames.of(verdict);
 }
 
 Validation

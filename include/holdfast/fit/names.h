@@ -1,0 +1,46 @@
+/// \file Names of what is asked of a fit and of how it ended.
+#pragma once
+
+#include <holdfast/fit/options.h>
+#include <holdfast/fit/result.h>
+#include <holdfast/patch/names.h>
+
+#include <array>
+#include <cstddef>
+#include <string_view>
+
+namespace holdfast {
+
+/// Those of the two requests that leave the type to the data, then the surfaces'.
+constexpr auto
+surfaceRequestNames()
+{
+  constexpr std::size_t kOpen = 2;
+  std::array<std::string_view, kOpen + kSurfaceNames.words.size()> words{"auto",
+                                                                         "paraboloid"};
+  for (std::size_t i = 0; i < kSurfaceNames.words.size(); ++i)
+    words[kOpen + i] = kSurfaceNames.words[i];
+  return EnumNames<SurfaceRequest, words.size()>{words};
+}
+
+inline constexpr auto kSurfaceRequestNames = surfaceRequestNames();
+static_assert(kSurfaceRequestNames.of(SurfaceRequest::Plane) ==
+                      kSurfaceNames.of(SurfaceType::Plane) &&
+                  kSurfaceRequestNames.of(SurfaceRequest::CircularParaboloid) ==
+                      kSurfaceNames.of(SurfaceType::CircularParaboloid),
+              "requests follow the order of the surfaces");
+
+inline constexpr EnumNames<Residual, 2> kResidualNames{{"sampson", "ray"}};
+
+inline constexpr EnumNames<FitStatus, 10> kStatusNames{{"converged",
+                                                        "axis_not_observable",
+                                                        "curvature_not_observable",
+                                                        "iteration_limit",
+                                                        "too_few_points",
+                                                        "degenerate",
+                                                        "curvature_out_of_range",
+                                                        "curvature_sign_mismatch",
+                                                        "orientation_singular",
+                                                        "non_finite"}};
+
+} // namespace holdfast

@@ -1,0 +1,15 @@
+/// \file Names of neighbourhoods and of the ways to choose seeds.
+#pragma once
+
+#include <holdfast/patch/names.h>
+#include <holdfast/pcl/neighborhood_sampler.h>
+
+namespace holdfast {
+
+inline constexpr EnumNames<Neighborhood, 4> kNeighborhoodNames{
+    {"disc", "ball", "geodesic", "knn"}};
+
+inline constexpr EnumNames<SeedStrategy, 3> kSeedStrategyNames{
+    {"grid", "random", "poisson"}};
+
+} // namespace holdfast
