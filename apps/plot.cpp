@@ -1,9 +1,10 @@
 #include "plot.h"
 
+#include <fmt/printf.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <sstream>
 
@@ -50,9 +51,7 @@ escaped(const std::string& text)
 std::string
 number(double value, const char* format = "%.6g")
 {
-  char text[32];
-  std::snprintf(text, sizeof(text), format, value);
-  return text;
+  return fmt::sprintf(format, value);
 }
 
 // Hundredths of a px are enough.

@@ -3,18 +3,21 @@
 #include <holdfast/sensor/noise_registry.h>
 #include <holdfast/sensor/parameter_error.h>
 
+#include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <stdexcept>
+#include <string_view>
+#include <system_error>
 #include <utility>
 
 namespace holdfast {
@@ -22,6 +25,23 @@ namespace holdfast {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// The whole word as a number, whatever the locale of the program; nothing for another
+/// word.
+template <typename Number>
+std::optional<Number>
+parseNumber(std::string_view word)
+{
+  // YAML allows a plus sign, from_chars does not.
+  if (word.size() > 1 && word[0] == '+' && word[1] != '-')
+    word.remove_prefix(1);
+  Number value{};
+  const char* end = word.data() + word.size();
+  const auto result = std::from_chars(word.data(), end, value);
+  if (result.ec != std::errc() || result.ptr != end)
+    return std::nullopt;
+  return value;
+}
 
 /// Counted from 1, also for an empty file, whose content is nowhere.
 int
@@ -44,7 +64,9 @@ public:
     for (const auto& entry : node) {
       const int entry_line = lineOf(entry.first.Mark());
       if (!entry.first.IsScalar())
-        failAt(entry_line, path_.empty() ? "file" : path_, "has a key that is no name");
+        failAt(entry_line,
+               path_.empty() ? "file" : path_,
+               "has a key that is not a name");
       const std::string& name = entry.first.Scalar();
       if (!entries_.insert({name, {entry.second, entry_line, false}}).second)
         failAt(entry_line, fullName(name), "is given twice");
@@ -66,11 +88,10 @@ public:
 
   double number(const std::string& name)
   {
-    double result = 0.0;
-    if (!YAML::convert<double>::decode(read(name).value, result) ||
-        !std::isfinite(result))
+    const auto result = parseNumber<double>(scalar(name));
+    if (!result || !std::isfinite(*result))
       fail(name, "must be a finite number");
-    return result;
+    return *result;
   }
 
   double positive(const std::string& name)
@@ -85,11 +106,10 @@ public:
   {
     // More than any image sensor has, less than overflows an index.
     constexpr int kMaximum = 20000;
-    int result = 0;
-    if (!YAML::convert<int>::decode(read(name).value, result) || result < 1 ||
-        result > kMaximum)
-      fail(name, "must be a whole number from 1 to " + std::to_string(kMaximum));
-    return result;
+    const auto result = parseNumber<int>(scalar(name));
+    if (!result || *result < 1 || *result > kMaximum)
+      fail(name, fmt::format("must be a whole number from 1 to {}", kMaximum));
+    return *result;
   }
 
   Section section(const std::string& name)
@@ -133,12 +153,18 @@ private:
     return found->second;
   }
 
+  /// Empty for anything but a word.
+  std::string scalar(const std::string& name)
+  {
+    const YAML::Node value = read(name).value;
+    return value.IsScalar() ? value.Scalar() : std::string();
+  }
+
   [[noreturn]] void failAt(int line,
                            const std::string& what,
                            const std::string& problem) const
   {
-    throw std::runtime_error(file_ + ":" + std::to_string(line) + ": " + what + " " +
-                             problem);
+    throw std::runtime_error(fmt::format("{}:{}: {} {}", file_, line, what, problem));
   }
 
   std::string file_;
@@ -227,15 +253,6 @@ readSensor(const YAML::Node& node, const std::string& file)
   return sensor;
 }
 
-/// The shortest text that reads back as this number.
-std::string
-numberText(double value)
-{
-  std::array<char, 32> text;
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), value);
-  return {text.data(), end.ptr};
-}
-
 /// Writes the maps of a sensor file, each key below its comment.
 class SectionWriter {
 public:
@@ -262,7 +279,7 @@ public:
 
   void entry(const std::string& key, double value)
   {
-    entry(key, numberText(value));
+    entry(key, fmt::format("{}", value)); // as few digits as read back the same
   }
 
   /// \throw std::invalid_argument when a comment was left over.
@@ -364,9 +381,10 @@ findSensor(const std::string& name_or_path)
   std::string known;
   for (const std::string& name : listSensors())
     known += (known.empty() ? "" : ", ") + name;
-  throw std::runtime_error("sensor " + name_or_path +
-                           ": no such file, and no built-in sensor of that name (" +
-                           known + ")");
+  throw std::runtime_error(
+      fmt::format("sensor {}: no such file, and no built-in sensor of that name ({})",
+                  name_or_path,
+                  known));
 }
 
 } // namespace
@@ -379,8 +397,8 @@ loadSensor(const std::string& name_or_path)
     return readSensor(YAML::LoadFile(file), file);
   }
   catch (const YAML::Exception& error) {
-    throw std::runtime_error(file + ":" + std::to_string(lineOf(error.mark)) + ": " +
-                             error.msg);
+    throw std::runtime_error(
+        fmt::format("{}:{}: {}", file, lineOf(error.mark), error.msg));
   }
 }
 

@@ -6,6 +6,7 @@
 #include <holdfast/validation/names.h>
 #include <holdfast/version.h>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include <pcl/conversions.h>
@@ -16,7 +17,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
-#include <iomanip>
+#include <sstream>
 #include <stdexcept>
 
 namespace holdfast {
@@ -377,17 +378,22 @@ writeMeshText(std::ostream& out, const ColoredMesh& mesh, bool in_double)
 {
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
     const Eigen::Vector3d& v = mesh.vertices[i];
-    if (in_double)
-      out << std::setprecision(17) << v.x() << ' ' << v.y() << ' ' << v.z();
-    else
-      out << std::setprecision(9) << static_cast<float>(v.x()) << ' '
-          << static_cast<float>(v.y()) << ' ' << static_cast<float>(v.z());
-    for (const std::uint8_t channel : mesh.colors[i])
-      out << ' ' << static_cast<int>(channel);
-    out << '\n';
+    const auto& color = mesh.colors[i];
+    // Digits that give the value back in the precision it is read with.
+    const int digits = in_double ? 17 : 9;
+    out << fmt::format("{:.{}g} {:.{}g} {:.{}g} {} {} {}\n",
+                       v.x(),
+                       digits,
+                       v.y(),
+                       digits,
+                       v.z(),
+                       digits,
+                       color[0],
+                       color[1],
+                       color[2]);
   }
   for (const auto& t : mesh.triangles)
-    out << "3 " << t[0] << ' ' << t[1] << ' ' << t[2] << '\n';
+    out << fmt::format("3 {} {} {}\n", t[0], t[1], t[2]);
 }
 
 void
@@ -475,15 +481,15 @@ writeMesh(std::ostream& out,
   const ColoredMesh mesh = meshOf(patches, offset);
   // What was shifted to fit into float does not fit into it.
   const bool in_double = !offset.isZero(0.0);
-  const std::string type = in_double ? "double" : "float";
-  out << "ply\nformat " << (ascii ? "ascii" : "binary_little_endian")
-      << " 1.0\ncomment bounded patches, coloured by surface type\nelement vertex "
-      << mesh.vertices.size() << "\nproperty " << type << " x\nproperty " << type
-      << " y\nproperty " << type
-      << " z\n"
-         "property uchar red\nproperty uchar green\nproperty uchar blue\nelement face "
-      << mesh.triangles.size()
-      << "\nproperty list uchar int vertex_indices\nend_header\n";
+  out << fmt::format(
+      "ply\nformat {0} 1.0\ncomment bounded patches, coloured by surface type\n"
+      "element vertex {1}\nproperty {3} x\nproperty {3} y\nproperty {3} z\n"
+      "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+      "element face {2}\nproperty list uchar int vertex_indices\nend_header\n",
+      ascii ? "ascii" : "binary_little_endian",
+      mesh.vertices.size(),
+      mesh.triangles.size(),
+      in_double ? "double" : "float");
   if (ascii)
     writeMeshText(out, mesh, in_double);
   else
@@ -498,12 +504,17 @@ writePatchPoints(std::ostream& out,
   const pcl::PointCloud<PatchPoint> cloud = toPatchCloud(patches, sensor_pose);
   pcl::PCLPointCloud2 fields;
   pcl::toPCLPointCloud2(cloud, fields);
-  const int failed = pcl::PCDWriter().writeBinaryCompressed(out,
+  // Not straight to `out`: PCL changes a stream's locale, which makes a std::ofstream
+  // on a full disk throw std::bad_cast.
+  std::ostringstream pcd;
+  const int failed = pcl::PCDWriter().writeBinaryCompressed(pcd,
                                                             fields,
                                                             cloud.sensor_origin_,
                                                             cloud.sensor_orientation_);
   if (failed != 0)
     out.setstate(std::ios::failbit);
+  else
+    out << pcd.str();
 }
 
 std::array<std::uint8_t, 3>
