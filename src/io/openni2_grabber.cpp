@@ -206,7 +206,14 @@ Openni2Grabber::Impl::start()
   prepare();
   stop_ = stop_by_callback_ = false;
   running_ = true;
-  io::runOnLastingThread([self = shared_from_this()] { self->run(); });
+  try {
+    io::runOnLastingThread([self = shared_from_this()] { self->run(); });
+  }
+  catch (...) {
+    running_ = false; // join() must not wait for a thread that never was
+    source_->stop();
+    throw;
+  }
 }
 
 /// Has the device deliver from now on.

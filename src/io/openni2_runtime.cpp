@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <limits>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -24,19 +25,34 @@ class LastingThreads {
 public:
   explicit LastingThreads(std::size_t most) : most_(most) {}
 
+  /// \throw Openni2Error when there is no thread to be had; the job is forgotten then.
   void run(std::function<void()> job)
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     jobs_.push_back(std::move(job));
-    if (jobs_.size() > idle_ && threads_ < most_) {
-      ++threads_;
-      std::thread([this] { work(); }).detach();
-    }
+    if (jobs_.size() > idle_ && threads_ < most_)
+      addThread();
     else
       has_job_.notify_one();
   }
 
 private:
+  void addThread()
+  {
+    try {
+      std::thread([this] { work(); }).detach();
+      ++threads_;
+    }
+    catch (const std::system_error& error) {
+      jobs_.pop_back();
+      throw Openni2Error(std::string("no thread for the camera: ") + error.what());
+    }
+    catch (...) {
+      jobs_.pop_back();
+      throw;
+    }
+  }
+
   [[noreturn]] void work()
   {
     for (;;)

@@ -47,6 +47,7 @@ std::string resolveDevice(const std::string& device);
 /// OpenNI2 remembers every thread that has ever called one of its functions, and when a
 /// new one comes, asks the system whether the others still live, which crashes for one
 /// that has ended. So the threads are kept and lent to the next job.
+/// \throw pcl::IOException when the system has no more threads.
 void runOnLastingThread(std::function<void()> job);
 
 /// Runs a job on the one thread that all devices share.

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <exception>
 #include <mutex>
+#include <new>
 #include <system_error>
 #include <thread>
 #include <vector>
@@ -86,13 +87,15 @@ public:
   /// Starts as many as the system gives, up to `count`, as threads 1, 2, ...
   void start(int count, Work& work)
   {
-    threads_.reserve(static_cast<std::size_t>(std::max(count, 0)));
+    // No more to be had, for want of threads or of memory: fewer do the work.
     try {
+      threads_.reserve(static_cast<std::size_t>(std::max(count, 0)));
       for (int i = 1; i <= count; ++i)
         threads_.emplace_back([&work, i] { work.run(i); });
     }
     catch (const std::system_error&) {
-      // No more to be had: fewer do the work.
+    }
+    catch (const std::bad_alloc&) {
     }
   }
 
