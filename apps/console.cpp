@@ -1,11 +1,14 @@
 #include "console.h"
 
+#include "endings.h"
+
 #include <holdfast/io/cloud_io.h>
+
+#include <fmt/printf.h>
 
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 #include <iostream>
 #include <sstream>
@@ -59,20 +62,20 @@ forEachCloud(const std::vector<std::string>& paths,
              const std::function<bool(const std::string&)>& work)
 {
   int exit_code = 0;
-  const auto attempt = [&exit_code](const auto& step) {
+  const auto attempt = [&exit_code](const std::string& subject, const auto& step) {
     try {
       if (!step())
         exit_code = 1;
     }
-    catch (const std::exception& error) {
-      printError(error.what());
+    catch (...) {
+      printCurrentError(subject.c_str());
       exit_code = 1;
     }
   };
   for (const std::string& path : paths)
-    attempt([&] {
+    attempt(path, [&] {
       for (const std::string& cloud : cloudsOf(path))
-        attempt([&] { return work(cloud); });
+        attempt(cloud, [&] { return work(cloud); });
       return true;
     });
   return exit_code;
@@ -115,9 +118,11 @@ ProgressBar::update(int done, int total)
     return;
   percent_ = percent;
   const auto full = static_cast<std::size_t>(kBarWidth * percent / 100);
-  line_.show(label_ + " [" + std::string(full, '#') +
-             std::string(kBarWidth - full, ' ') + "] " + std::to_string(percent) +
-             " %");
+  line_.show(fmt::format("{} [{:<{}}] {} %",
+                         label_,
+                         std::string(full, '#'),
+                         kBarWidth,
+                         percent));
 }
 
 double
@@ -151,9 +156,7 @@ formatTable(const std::vector<std::vector<std::string>>& rows)
 std::string
 formatNumber(const char* format, double value)
 {
-  char text[64];
-  std::snprintf(text, sizeof(text), format, value);
-  return text;
+  return fmt::sprintf(format, value); // in the classic locale, unlike std::printf
 }
 
 } // namespace holdfast::app

@@ -1,11 +1,11 @@
 #include "commands.h"
 #include "console.h"
+#include "endings.h"
 
 #include <holdfast/version.h>
 
 #include <CLI/CLI.hpp>
 
-#include <exception>
 #include <iostream>
 #include <string>
 
@@ -94,11 +94,12 @@ run(int argc, char** argv)
 int
 main(int argc, char** argv)
 {
+  holdfast::app::prepareForTheEnd();
   try {
     return run(argc, argv);
   }
-  catch (const std::exception& error) {
-    holdfast::app::printError(error.what());
+  catch (...) {
+    holdfast::app::printCurrentError();
     return 1;
   }
 }

@@ -4,10 +4,12 @@
 
 #include <holdfast/io/cloud_io.h>
 
-#include <cstdio>
+#include <fmt/format.h>
+
 #include <exception>
 #include <filesystem>
 #include <stdexcept>
+#include <system_error>
 #include <utility>
 
 namespace holdfast::app {
@@ -23,13 +25,7 @@ constexpr const char* kFramePrefix = "frame_";
 std::string
 frameName(std::uint64_t number)
 {
-  char name[32];
-  std::snprintf(name,
-                sizeof name,
-                "%s%06llu",
-                kFramePrefix,
-                static_cast<unsigned long long>(number));
-  return name;
+  return fmt::format("{}{:06}", kFramePrefix, number);
 }
 
 void
@@ -45,7 +41,12 @@ FrameRecorder::FrameRecorder(std::string folder, bool frames_can_wait)
 : folder_(std::move(folder)), frames_can_wait_(frames_can_wait)
 {
   makeFrameFolder(folder_);
-  thread_ = std::thread([this] { write(); });
+  try {
+    thread_ = std::thread([this] { write(); });
+  }
+  catch (const std::system_error& error) {
+    throw std::runtime_error(folder_ + ": no thread to write with: " + error.what());
+  }
 }
 
 FrameRecorder::~FrameRecorder()

@@ -1,6 +1,7 @@
 #include "grabber_run.h"
 
 #include "console.h"
+#include "endings.h"
 
 #include <array>
 #include <atomic>
@@ -20,13 +21,14 @@ std::atomic<bool> interrupted{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "as signal handlers need it");
 
 extern "C" void
-noteInterrupt(int)
+noteInterrupt(int signal)
 {
-  interrupted = true;
+  if (interrupted.exchange(true))
+    endBySignal(signal);
 }
 
-/// Turns the signals that end a program into a note; the second time they end it. A
-/// reader of our output that has gone is an error of writing, not of life and death.
+/// Turns the signals that end a program into a note; the second one ends it. A reader
+/// of our output that has gone is an error of writing, not of life and death.
 class SignalGuard {
 public:
   SignalGuard()
@@ -34,9 +36,12 @@ public:
     interrupted = false;
     struct sigaction action {};
     action.sa_handler = noteInterrupt;
-    action.sa_flags = SA_RESETHAND | SA_RESTART; // no write fails because of it
+    action.sa_flags = SA_RESTART; // no write fails because of it
     ::sigaction(SIGINT, &action, &on_interrupt_);
     ::sigaction(SIGTERM, &action, &on_termination_);
+    ::sigaction(SIGHUP, nullptr, &on_hangup_);
+    if (on_hangup_.sa_handler != SIG_IGN) // as nohup has it
+      ::sigaction(SIGHUP, &action, nullptr);
     action.sa_handler = SIG_IGN;
     ::sigaction(SIGPIPE, &action, &on_pipe_);
   }
@@ -44,6 +49,7 @@ public:
   {
     ::sigaction(SIGINT, &on_interrupt_, nullptr);
     ::sigaction(SIGTERM, &on_termination_, nullptr);
+    ::sigaction(SIGHUP, &on_hangup_, nullptr);
     ::sigaction(SIGPIPE, &on_pipe_, nullptr);
   }
   SignalGuard(const SignalGuard&) = delete;
@@ -52,6 +58,7 @@ public:
 private:
   struct sigaction on_interrupt_ {};
   struct sigaction on_termination_ {};
+  struct sigaction on_hangup_ {};
   struct sigaction on_pipe_ {};
 };
 

@@ -29,8 +29,8 @@ struct RunCallbacks {
 };
 
 /// Runs a camera until there are enough frames, a recording has ended, the camera has
-/// failed for good, or the user has had enough (SIGINT, SIGTERM, at which everything is
-/// put in order). What happens to the camera is told on standard error.
+/// failed for good, or the user has had enough (SIGINT, SIGTERM, SIGHUP, at which
+/// everything is put in order). What happens to the camera is told on standard error.
 /// \return the exit code of the command. \throw what the callback for frames threw.
 int runGrabber(Openni2Grabber& grabber,
                const RunOptions& options,
