@@ -9,9 +9,8 @@ positiveNumber(const std::string& unit)
 {
   return CLI::Validator(
       [](const std::string& text) {
-        double value = 0.0;
-        const bool is_number = CLI::detail::lexical_cast(text, value);
-        return is_number && std::isfinite(value) && value > 0.0 ?
+        const auto value = parseNumber<double>(text);
+        return value && std::isfinite(*value) && *value > 0.0 ?
                    std::string() :
                    text + " is not a positive number";
       },

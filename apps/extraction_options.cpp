@@ -1,42 +1,16 @@
 #include "extraction_options.h"
 
 #include "command_line.h"
+#include "common_options.h"
+
+#include <holdfast/fit/names.h>
+#include <holdfast/pcl/names.h>
+#include <holdfast/uncertainty/names.h>
 
 #include <CLI/CLI.hpp>
 
 namespace holdfast::app {
 namespace {
-
-const Choices<SurfaceRequest> kSurfaces{
-    {"auto", SurfaceRequest::Auto},
-    {"paraboloid", SurfaceRequest::Paraboloid},
-    {"plane", SurfaceRequest::Plane},
-    {"sphere", SurfaceRequest::Sphere},
-    {"cylinder", SurfaceRequest::CircularCylinder},
-    {"elliptic-paraboloid", SurfaceRequest::EllipticParaboloid},
-    {"hyperbolic-paraboloid", SurfaceRequest::HyperbolicParaboloid},
-    {"cylindric-paraboloid", SurfaceRequest::CylindricParaboloid},
-    {"circular-paraboloid", SurfaceRequest::CircularParaboloid}};
-
-const Choices<BoundaryType> kBoundaries{{"ellipse", BoundaryType::Ellipse},
-                                        {"circle", BoundaryType::Circle},
-                                        {"rectangle", BoundaryType::Rectangle},
-                                        {"quad", BoundaryType::Quad}};
-
-const Choices<Neighborhood> kNeighborhoods{{"disc", Neighborhood::Disc},
-                                           {"ball", Neighborhood::Ball},
-                                           {"geodesic", Neighborhood::Geodesic},
-                                           {"knn", Neighborhood::Knn}};
-
-const Choices<CovarianceMode> kCovarianceModes{
-    {"exact", CovarianceMode::Exact},
-    {"gauss-newton", CovarianceMode::GaussNewton},
-    {"second-order", CovarianceMode::SecondOrder},
-    {"stagewise", CovarianceMode::Stagewise},
-    {"monte-carlo", CovarianceMode::MonteCarlo}};
-
-const Choices<Residual> kResiduals{{"sampson", Residual::Sampson},
-                                   {"ray", Residual::Ray}};
 
 void
 addPatchOptions(CLI::App& command, ExtractionSettings& settings)
@@ -46,15 +20,17 @@ addPatchOptions(CLI::App& command, ExtractionSettings& settings)
   addChoice(command,
             "--surface",
             fit.surface,
-            kSurfaces,
+            kSurfaceRequestNames,
             "Surface to fit; auto: a paraboloid whose kind, or flatness, the points "
-            "decide; paraboloid: the same, but never a plane")
+            "decide; paraboloid: the same, but never a plane; cylinder is short for "
+            "circular_cylinder",
+            {"cylinder", SurfaceRequest::CircularCylinder})
       ->default_str("auto")
       ->group(group);
   addChoice(command,
             "--boundary",
             fit.plane_boundary,
-            kBoundaries,
+            kBoundaryNames,
             "Boundary of planes; other surfaces imply theirs (default: ellipse)")
       ->group(group);
   command
@@ -74,7 +50,7 @@ addPatchOptions(CLI::App& command, ExtractionSettings& settings)
   addChoice(command,
             "--residual",
             fit.residual,
-            kResiduals,
+            kResidualNames,
             "Distance to minimise: first order, or exact along the noise")
       ->default_str("ray")
       ->group(group);
@@ -87,7 +63,7 @@ addPatchOptions(CLI::App& command, ExtractionSettings& settings)
   addChoice(command,
             "--covariance",
             settings.options.covariance,
-            kCovarianceModes,
+            kCovarianceModeNames,
             "Covariance of the parameters: exact to first order; its Gauss-Newton "
             "approximation; with second-order terms; the paper's chain of stages; or "
             "1000 refits to resampled points")
@@ -124,7 +100,7 @@ addNeighborhoodOptions(CLI::App& command, SamplerOptions& sampler)
       command,
       "--neighborhood",
       sampler.neighborhood,
-      kNeighborhoods,
+      kNeighborhoodNames,
       "Points around a seed: pixels within the image of the radius, points within "
       "it, the same along the surface, or the --k nearest")
       ->default_str("disc")
@@ -188,14 +164,7 @@ addExtractionOptions(CLI::App& command, ExtractionSettings& settings)
   addPatchOptions(command, settings);
   addNeighborhoodOptions(command, settings.options.sampler);
   addValidationOptions(command, settings.options.validation.emplace());
-  command
-      .add_option("--threads",
-                  settings.options.threads,
-                  "Threads to use, 0: all cores; results do not depend on it")
-      ->check(CLI::Range(0, 4096, "N"))
-      ->type_name("")
-      ->capture_default_str()
-      ->group("Patches");
+  addThreadsOption(command, settings.options.threads);
   exclude(command, "--paper", {"--residual"});
 }
 

@@ -1,9 +1,11 @@
 #include "command_line.h"
 #include "commands.h"
+#include "common_options.h"
 #include "console.h"
 #include "input_options.h"
 
 #include <holdfast/io/atomic_file.h>
+#include <holdfast/io/names.h>
 #include <holdfast/pcl/intrinsics.h>
 
 #include <pcl/common/point_tests.h>
@@ -32,6 +34,7 @@ constexpr const char* kExamples = R"(Examples:
 struct InfoSettings {
   InputOptions input;
   std::string json_path; ///< empty: none; "-": standard output
+  bool quiet = false; ///< errors only
 };
 
 /// What there is to say about a cloud.
@@ -144,7 +147,7 @@ factsJson(const CloudFacts& facts)
       {"max", {high.x(), high.y(), high.z()}},
       {"depth_range", {facts.nearest_m, facts.farthest_m}},
       {"unit_m", facts.file.unit_m},
-      {"axes", axesName(facts.file.axes)},
+      {"axes", kCloudAxesNames.of(facts.file.axes)},
       {"offset", {facts.offset.x(), facts.offset.y(), facts.offset.z()}},
       {"camera", facts.file.camera ? cameraJson(*facts.file.camera) : Json()},
       {"viewpoint", facts.file.viewpoint ? poseJson(*facts.file.viewpoint) : Json()},
@@ -210,7 +213,7 @@ appliedText(const CloudFacts& facts)
   if (facts.file.unit_m != 1.0)
     text += fmt::format("  unit         {} m\n", facts.file.unit_m);
   if (facts.file.axes != CloudAxes::Camera)
-    text += fmt::format("  axes         {}\n", axesName(facts.file.axes));
+    text += fmt::format("  axes         {}\n", kCloudAxesNames.of(facts.file.axes));
   if (!facts.offset.isZero(0.0))
     text += fmt::format("  offset       {} m\n", vectorText(facts.offset));
   if (facts.file.camera)
@@ -259,10 +262,10 @@ runInfo(const InfoSettings& settings)
   const int exit_code =
       forEachCloud(settings.input.clouds, [&](const std::string& path) {
         const CloudFacts facts = factsAbout(path, settings.input, sensor);
-        if (settings.json_path.empty()) {
+        if (settings.json_path != "-" && !settings.quiet)
           std::cout << factsText(facts) << std::flush;
+        if (settings.json_path.empty())
           return true;
-        }
         // File names need not be UTF-8; JSON must.
         (file ? file->stream() : std::cout)
             << factsJson(facts).dump(-1, ' ', false, Json::error_handler_t::replace)
@@ -284,13 +287,10 @@ addInfoCommand(CLI::App& app, int& exit_code)
   command->footer(kExamples);
   const auto settings = std::make_shared<InfoSettings>();
   addInputOptions(*command, settings->input);
-  command
-      ->add_option("--json",
-                   settings->json_path,
-                   "Write JSON to this file, or with - to standard output; one object "
-                   "per cloud, each on a line of its own")
-      ->type_name("FILE")
-      ->group("Output");
+  addJsonOption(*command,
+                settings->json_path,
+                "one object per cloud, each on a line of its own");
+  addQuietOption(*command, settings->quiet);
   tidyHelp(*command);
   command->callback([settings, &exit_code] { exit_code = runInfo(*settings); });
 }

@@ -3,6 +3,7 @@
 #include "command_line.h"
 
 #include <holdfast/io/config.h>
+#include <holdfast/io/names.h>
 
 #include <CLI/CLI.hpp>
 #include <Eigen/Geometry>
@@ -106,27 +107,38 @@ addCameraOptions(CLI::App& command, InputOptions& options)
       ->group("Input");
 }
 
+constexpr EnumNames<LengthUnit, 4> kLengthUnitNames{{"m", "mm", "cm", "um"}};
+
+double
+meters(LengthUnit unit)
+{
+  switch (unit) {
+  case LengthUnit::Meter:
+    return 1.0;
+  case LengthUnit::Millimeter:
+    return 1e-3;
+  case LengthUnit::Centimeter:
+    return 1e-2;
+  case LengthUnit::Micrometer:
+    return 1e-6;
+  }
+  return 1.0;
+}
+
 void
 addFrameOptions(CLI::App& command, InputOptions& options)
 {
-  static const Choices<double> kUnits{{"m", 1.0},
-                                      {"mm", 1e-3},
-                                      {"cm", 1e-2},
-                                      {"um", 1e-6}};
-  static const Choices<CloudAxes> kAxes{{"x-right,y-down,z-forward", CloudAxes::Camera},
-                                        {"opengl", CloudAxes::OpenGl},
-                                        {"ros", CloudAxes::Ros}};
   addChoice(command,
             "--unit",
-            options.unit_m,
-            kUnits,
+            options.unit,
+            kLengthUnitNames,
             "Unit of the coordinates in the file; results are in m")
       ->default_str("m")
       ->group("Input");
   addChoice(command,
             "--axes",
             options.axes,
-            kAxes,
+            kCloudAxesNames,
             "Axes of the sensor: opengl is x right, y up, z back; ros is x forward, y "
             "left, z up")
       ->default_str("x-right,y-down,z-forward")
@@ -236,7 +248,7 @@ loadOptions(const InputOptions& options, const Sensor& sensor)
     load.camera.width = sensor.camera.width;
     load.camera.height = sensor.camera.height;
   }
-  load.unit_m = options.unit_m.value_or(1.0);
+  load.unit_m = meters(options.unit.value_or(LengthUnit::Meter));
   load.axes = options.axes;
   load.sensor_pose = options.sensor_pose;
   load.viewpoint = options.viewpoint;
@@ -252,7 +264,7 @@ inputNotices(const InputOptions& options, const CloudFileInfo& info)
   std::vector<std::string> notices = info.notices;
   if (options.depth_scale_given && !info.is_depth_image)
     notices.emplace_back("no depth image: --depth-scale does not apply");
-  if (options.unit_m && info.is_depth_image)
+  if (options.unit && info.is_depth_image)
     notices.emplace_back("a depth image: --depth-scale applies, not --unit");
   return notices;
 }

@@ -13,13 +13,16 @@
 
 namespace holdfast::app {
 
+/// Of the coordinates in a file.
+enum class LengthUnit : std::uint8_t { Meter, Millimeter, Centimeter, Micrometer };
+
 struct InputOptions {
   std::vector<std::string> clouds; ///< files and folders
   std::string sensor_name = "kinect_v1";
   double depth_scale = 1000.0;
   bool depth_scale_given = false;
   std::optional<Camera> intrinsics; ///< fx, fy, cx and cy alone
-  std::optional<double> unit_m;
+  std::optional<LengthUnit> unit;
   std::optional<CloudAxes> axes;
   std::optional<Pose> sensor_pose;
   std::optional<Eigen::Vector3d> viewpoint;

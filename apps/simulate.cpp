@@ -11,6 +11,7 @@
 
 #include "command_line.h"
 #include "commands.h"
+#include "common_options.h"
 #include "input_options.h"
 
 #include <algorithm>
@@ -37,6 +38,7 @@ struct SimulateArguments {
   std::uint64_t random_seed = 1;
   SimulationOptions simulation;
   bool covariance = false;
+  bool quiet = false; ///< it has nothing to say but errors anyway
   bool ascii = false;
 };
 
@@ -216,10 +218,10 @@ requireScene(const std::string& name)
 std::string
 requireFactor(const std::string& text)
 {
-  double value = 0.0;
-  const bool is_factor =
-      CLI::detail::lexical_cast(text, value) && std::isfinite(value) && value >= 0.0;
-  return is_factor ? "" : text + " is not a number >= 0";
+  const auto value = parseNumber<double>(text);
+  return value && std::isfinite(*value) && *value >= 0.0 ?
+             "" :
+             text + " is not a number >= 0";
 }
 
 std::string
@@ -284,6 +286,7 @@ addNoiseOptions(CLI::App& command, SimulateArguments& arguments)
                    arguments.covariance,
                    "write the covariance of each point's noise too (m^2)");
   command.add_flag("--ascii", arguments.ascii, "text instead of binary PCD");
+  addQuietOption(command, arguments.quiet);
 }
 
 } // namespace

@@ -52,8 +52,9 @@ heading(const PatchReport& report)
 {
   const auto patches = static_cast<double>(report.result.patches.size());
   return report.cloud + ": " + formatNumber("%.0f", patches) +
-         (patches == 1.0 ? " patch" : " patches") + ", sensor " + report.result.sensor.name +
-         ", loaded in " + formatNumber("%.0f", report.load_ms) + " ms, fitted in " +
+         (patches == 1.0 ? " patch" : " patches") + ", sensor " +
+         report.result.sensor.name + ", loaded in " +
+         formatNumber("%.0f", report.load_ms) + " ms, fitted in " +
          formatNumber("%.1f", report.fit_ms) + " ms (" +
          formatNumber("%.0f", 1e3 * patches / std::max(report.fit_ms, 1e-6)) +
          " patches/s)\n";

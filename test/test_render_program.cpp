@@ -324,7 +324,7 @@ TEST_F(RenderProgram, NonsenseOptionsAreRefused)
   expectError(2, {result, result, "--cloud", folder_ + "/bowl.pcd"}, "single RESULT");
   expectError(2, {result, "--color", "blue"}, "'blue' is none of type, sigma-normal");
   for (const std::string size : {"0x0", "960", "960x", "x720", "99999x720", "-9x9"})
-    expectError(2, {result, "--size=" + size}, "'" + size + "' is no WIDTHxHEIGHT");
+    expectError(2, {result, "--size=" + size}, "'" + size + "' is not WIDTHxHEIGHT");
   for (const std::string view : {"above", "1", "1,", "0,91", "nan,0"})
     expectError(2, {result, "--view", view}, "'" + view + "' is neither camera");
   for (const std::string background : {"pink", "#12345", "#12345g", "123456"})

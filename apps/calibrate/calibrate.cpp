@@ -1,5 +1,6 @@
 #include "command_line.h"
 #include "commands.h"
+#include "common_options.h"
 #include "console.h"
 #include "input_options.h"
 #include "noise_report.h"
@@ -47,6 +48,7 @@ struct CalibrateSettings {
   std::string sensor_path; ///< empty: none
   std::string plot_path; ///< empty: none
   std::string json_path; ///< empty: none; "-": standard output
+  bool quiet = false; ///< errors only
 };
 
 std::string
@@ -83,14 +85,15 @@ struct Recording {
 
 /// All frames, or nothing when one of them cannot be used, which has been said then.
 std::optional<Recording>
-loadRecording(const InputOptions& input, const Sensor& sensor)
+loadRecording(const InputOptions& input, const Sensor& sensor, bool quiet)
 {
   Recording recording;
   const int exit_code = forEachCloud(input.clouds, [&](const std::string& path) {
     CloudFileInfo info;
     RangeCloud cloud = loadCloud(path, loadOptions(input, sensor), &info);
-    for (const std::string& notice : inputNotices(input, info))
-      printNotice(path + ": " + notice);
+    if (!quiet)
+      for (const std::string& notice : inputNotices(input, info))
+        printNotice(path + ": " + notice);
     recording.add(path, std::move(cloud));
     return true;
   });
@@ -99,13 +102,16 @@ loadRecording(const InputOptions& input, const Sensor& sensor)
 }
 
 NoiseReport
-calibrate(const Recording& recording, const Sensor& nominal, int region_px)
+calibrate(const Recording& recording,
+          const Sensor& nominal,
+          const CalibrateSettings& settings)
 {
   std::string notice;
   const Sensor sensor = matchedSensor(nominal, recording.clouds.front(), &notice);
   try {
-    const NoiseReport report = measureNoise(recording.clouds, sensor, region_px);
-    if (!notice.empty())
+    const NoiseReport report =
+        measureNoise(recording.clouds, sensor, settings.region_px);
+    if (!notice.empty() && !settings.quiet)
       printNotice(recording.paths.front() + ": " + notice);
     return report;
   }
@@ -119,7 +125,7 @@ NoiseReport
 calibrateCamera(const CalibrateSettings& settings, Sensor sensor)
 {
   const std::vector<RangeCloud> frames =
-      captureFrames(settings.device, settings.frames, sensor.camera);
+      captureFrames(settings.device, settings.frames, settings.quiet, sensor.camera);
   return measureNoise(frames, sensor, settings.region_px);
 }
 
@@ -150,10 +156,11 @@ measure(const CalibrateSettings& settings, const Sensor& nominal)
   if (settings.input.clouds.empty())
     throw CLI::RequiredError("CLOUD or --device");
 #endif
-  const std::optional<Recording> recording = loadRecording(settings.input, nominal);
+  const std::optional<Recording> recording =
+      loadRecording(settings.input, nominal, settings.quiet);
   if (!recording)
     return std::nullopt;
-  return calibrate(*recording, nominal, settings.region_px);
+  return calibrate(*recording, nominal, settings);
 }
 
 int
@@ -174,7 +181,7 @@ runCalibrate(const CalibrateSettings& settings)
     saveCalibratedSensor(settings.sensor_path, report);
   if (settings.json_path == "-")
     std::cout << noiseReportJson(report).dump(2) << std::endl;
-  else
+  else if (!settings.quiet)
     std::cout << noiseReportText(report) << std::flush;
   if (json) {
     json->stream() << noiseReportJson(report).dump(2) << '\n';
@@ -200,10 +207,8 @@ requireSvg(const std::string& path)
 std::string
 requireRegion(const std::string& text)
 {
-  int size = 0;
-  return CLI::detail::lexical_cast(text, size) && size >= 8 && size % 8 == 0 ?
-             "" :
-             text + " is not a multiple of 8";
+  const auto size = parseNumber<int>(text);
+  return size && *size >= 8 && *size % 8 == 0 ? "" : text + " is not a multiple of 8";
 }
 
 void
@@ -220,13 +225,8 @@ addOutputOptions(CLI::App& command, CalibrateSettings& settings)
       ->check(CLI::Validator(requireSvg, "FILE.svg"))
       ->type_name("")
       ->group(group);
-  command
-      .add_option("--json",
-                  settings.json_path,
-                  "Write JSON to this file, or with - to standard output in place of "
-                  "the tables")
-      ->type_name("FILE")
-      ->group(group);
+  addJsonOption(command, settings.json_path);
+  addQuietOption(command, settings.quiet);
 }
 
 } // namespace

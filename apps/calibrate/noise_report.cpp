@@ -1,5 +1,6 @@
 #include "noise_report.h"
 
+#include "command_line.h"
 #include "console.h"
 
 #include <holdfast/io/config.h>
@@ -26,7 +27,7 @@ digits(double value)
 double
 rounded(double value)
 {
-  return std::stod(formatNumber("%.5g", value));
+  return parseNumber<double>(formatNumber("%.5g", value)).value_or(value);
 }
 
 std::string

@@ -2,6 +2,8 @@
 #include "experiment.h"
 #include "scene.h"
 
+#include "command_line.h"
+
 #include <holdfast/evaluation/consistency.h>
 #include <holdfast/simulation/reference_scenes.h>
 #include <holdfast/uncertainty/monte_carlo.h>
@@ -67,7 +69,10 @@ sceneOf(const std::string& name, PatchType type, std::size_t index, std::uint64_
   if (name == "table2")
     return tableTwoScene(type);
   if (name != "random")
-    return robotScene(type, std::stod(name.substr(6)), kTilt, kAzimuth);
+    return robotScene(type,
+                      parseNumber<double>(name.substr(6)).value(),
+                      kTilt,
+                      kAzimuth);
   std::mt19937_64 generator = trialGenerator(seed, index);
   const auto uniform = [&](double low, double high) {
     return low + (high - low) * std::generate_canonical<double, 53>(generator);
@@ -133,7 +138,9 @@ bool
 chosen(const std::vector<std::string>& choice, const std::string& name)
 {
   return choice.empty() ||
-         std::find(choice.begin(), choice.end(), name) != choice.end();
+         std::any_of(choice.begin(), choice.end(), [&name](const std::string& chosen) {
+           return isSameName(chosen, name);
+         });
 }
 
 // One row to compute.
@@ -241,7 +248,10 @@ consistencyExperiment()
                          std::vector<std::string>& values,
                          const std::vector<std::string>& allowed,
                          const std::string& description) {
-      command.add_option(name, values, description)->check(CLI::IsMember(allowed));
+      command.add_option(name, values, description)
+          ->check(oneOf(allowed, [allowed](const std::string& word) {
+            return chosen(allowed, word);
+          }));
     };
     add("--type", choice->types, types, "Only these patch types");
     add("--mode", choice->modes, modes, "Covariance modes (default: exact)");

@@ -2,8 +2,10 @@
 
 #include "command_line.h"
 #include "commands.h"
+#include "common_options.h"
 #include "console.h"
 #include "input_options.h"
+#include "patch_output.h"
 
 #include <holdfast/io/atomic_file.h>
 #include <holdfast/version.h>
@@ -35,6 +37,7 @@ struct ExperimentArguments {
   ExperimentSettings settings;
   std::string output_folder; ///< empty: no files
   std::string json_path; ///< empty: none; "-": standard output
+  bool quiet = false; ///< errors only
 };
 
 /// The command that gives the same rows again: trials and seed always, and whatever
@@ -93,16 +96,13 @@ class ExperimentOutput {
 public:
   ExperimentOutput(const std::string& name, const ExperimentArguments& arguments)
   : print_json_(arguments.json_path == "-")
+  , print_text_(!print_json_ && !arguments.quiet)
   {
     if (!arguments.json_path.empty() && !print_json_)
       json_copy_.emplace(arguments.json_path);
     if (arguments.output_folder.empty())
       return;
-    std::error_code error;
-    fs::create_directories(arguments.output_folder, error);
-    if (error)
-      throw std::runtime_error(arguments.output_folder +
-                               ": cannot be created: " + error.message());
+    makeFolder(arguments.output_folder);
     const std::string base = (fs::path(arguments.output_folder) / name).string();
     csv_.emplace(base + ".csv");
     json_.emplace(base + ".json");
@@ -113,7 +113,7 @@ public:
   {
     if (print_json_)
       writeReportJson(std::cout, json);
-    else
+    else if (print_text_)
       std::cout << reportText(report) << std::flush;
     for (std::optional<AtomicFile>* file : {&json_, &json_copy_})
       if (*file)
@@ -126,13 +126,22 @@ public:
       writeSvg(svg_->stream(),
                report.plot,
                "holdfast " HOLDFAST_VERSION ": " + json["command"].get<std::string>());
-    for (std::optional<AtomicFile>* file : {&csv_, &json_, &svg_, &json_copy_})
-      if (*file)
-        (*file)->commit();
+    commit();
   }
 
 private:
+  /// All files or none.
+  void commit()
+  {
+    std::vector<AtomicFile*> files;
+    for (std::optional<AtomicFile>* file : {&csv_, &json_, &svg_, &json_copy_})
+      if (*file)
+        files.push_back(&**file);
+    AtomicFile::commit(files);
+  }
+
   bool print_json_;
+  bool print_text_;
   std::optional<AtomicFile> json_copy_, csv_, json_, svg_;
 };
 
@@ -145,7 +154,7 @@ runExperiment(const Experiment& experiment,
   ExperimentOutput output(experiment.name, arguments);
   Report report;
   {
-    ProgressBar bar(experiment.name, true);
+    ProgressBar bar(experiment.name, !arguments.quiet);
     arguments.settings.progress = [&bar](int done, int total) {
       bar.update(done, total);
     };
@@ -172,27 +181,15 @@ addCommonOptions(CLI::App& command,
       ->type_name("")
       ->capture_default_str()
       ->group(group);
-  command
-      .add_option("--threads",
-                  arguments.settings.threads,
-                  "Threads; 0: one per core. Results do not depend on it")
-      ->check(CLI::Range(0, 4096, "N"))
-      ->type_name("")
-      ->capture_default_str()
-      ->group(group);
+  addThreadsOption(command, arguments.settings.threads)->group(group);
   command
       .add_option("-o,--output",
                   arguments.output_folder,
                   "Write " + experiment.name + ".csv, .json and .svg to this folder")
       ->type_name("DIR")
       ->group(group);
-  command
-      .add_option("--json",
-                  arguments.json_path,
-                  "Write JSON to this file, or with - to standard output in place of "
-                  "the table")
-      ->type_name("FILE")
-      ->group(group);
+  addJsonOption(command, arguments.json_path)->group(group);
+  addQuietOption(command, arguments.quiet)->group(group);
 }
 
 void

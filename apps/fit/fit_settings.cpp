@@ -1,19 +1,14 @@
 #include "fit_settings.h"
 
 #include "command_line.h"
+#include "common_options.h"
+
+#include <holdfast/pcl/names.h>
 
 #include <CLI/CLI.hpp>
 
 namespace holdfast::app {
 namespace {
-
-const Choices<SeedStrategy> kSeedStrategies{{"grid", SeedStrategy::Grid},
-                                            {"random", SeedStrategy::Random},
-                                            {"poisson", SeedStrategy::Poisson}};
-
-const Choices<NormalSide> kNormalSides{{"viewpoint", NormalSide::Viewpoint},
-                                       {"outward", NormalSide::Outward},
-                                       {"up", NormalSide::Up}};
 
 /// What takes the place of a sensor where there was none, or several places of it.
 void
@@ -30,7 +25,7 @@ addSurveyOptions(CLI::App& command, FitSettings& settings)
   addChoice(command,
             "--orient",
             settings.extraction.options.normal_side,
-            kNormalSides,
+            kNormalSideNames,
             "Side of the normals: that of the sensor; away from the middle of the "
             "cloud, for models seen from all sides; or that of +z, for ground surveys")
       ->default_str("viewpoint")
@@ -57,7 +52,7 @@ addSeedOptions(CLI::App& command, SamplerOptions& sampler)
       command,
       "--seed-strategy",
       sampler.strategy,
-      kSeedStrategies,
+      kSeedStrategyNames,
       "Where seeds lie: on a regular grid, anywhere, or anywhere but never closer "
       "than the spacing")
       ->default_str("grid")
@@ -83,16 +78,10 @@ addOutputOptions(CLI::App& command, FitSettings& settings)
           "and covariances) and NAME.patches.ply (coloured mesh) here")
       ->type_name("DIR")
       ->group("Output");
-  command
-      .add_option("--json",
-                  settings.json_path,
-                  "Write JSON to this file, or with - to standard output and nothing "
-                  "else there; one object per cloud, each on a line of its own")
-      ->type_name("FILE")
-      ->group("Output");
-  command
-      .add_flag("--quiet", settings.quiet, "Errors only: no table, notices or progress")
-      ->group("Output");
+  addJsonOption(command,
+                settings.json_path,
+                "one object per cloud, each on a line of its own");
+  addQuietOption(command, settings.quiet);
 }
 
 } // namespace

@@ -7,7 +7,7 @@
 namespace holdfast::app {
 
 std::vector<RangeCloud>
-captureFrames(const Openni2Options& options, int frames, Camera& camera)
+captureFrames(const Openni2Options& options, int frames, bool quiet, Camera& camera)
 {
   Openni2Options depth_only = options;
   depth_only.color = false;
@@ -19,6 +19,7 @@ captureFrames(const Openni2Options& options, int frames, Camera& camera)
   std::atomic<int> captured{0};
   RunOptions run;
   run.frames = frames;
+  run.quiet = quiet;
   run.reconnects = false;
   RunCallbacks callbacks;
   callbacks.frame = [&](const RangeFrame::ConstPtr& frame) {

@@ -1,6 +1,7 @@
 #include "device_options.h"
 
 #include "command_line.h"
+#include "common_options.h"
 
 #include <CLI/CLI.hpp>
 
@@ -89,8 +90,7 @@ addRunOptions(CLI::App& command, RunOptions& options)
       ->check(positiveNumber("S"))
       ->type_name("")
       ->group(group);
-  command.add_flag("--quiet", options.quiet, "Errors only: no status line or summary")
-      ->group(group);
+  addQuietOption(command, options.quiet);
 }
 
 } // namespace holdfast::app

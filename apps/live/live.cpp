@@ -1,5 +1,6 @@
 #include "command_line.h"
 #include "commands.h"
+#include "common_options.h"
 #include "console.h"
 #include "device_options.h"
 #include "extraction_options.h"
@@ -27,7 +28,7 @@ namespace {
 constexpr const char* kExamples = R"(Examples:
   holdfast live
       patches of the first camera, with a line that says how fast
-  holdfast live --max-patches 100 --budget-ms 10 --surface plane --json-lines -
+  holdfast live --max-patches 100 --budget-ms 10 --surface plane --json -
       at most 100 planes a frame, for another program: one line of JSON per frame
   holdfast live --view
       the same in a window
@@ -247,13 +248,10 @@ addLiveOptions(CLI::App& command, LiveSettings& settings)
                   "Record the camera: an .oni file, or a folder for a PCD per frame")
       ->type_name("FILE.oni|DIR")
       ->group("Output");
-  command
-      .add_option("--json-lines",
-                  settings.json_path,
-                  "Write the patches of each frame as a line of JSON to this file, or "
-                  "with - to standard output and nothing else there")
-      ->type_name("FILE")
-      ->group("Output");
+  addJsonOption(command,
+                settings.json_path,
+                "one object per frame, each on a line of its own",
+                "--json-lines");
   command
       .add_option("-o,--output",
                   settings.output_folder,

@@ -179,7 +179,7 @@ loadSubject(const std::string& result, const RenderSettings& settings)
   subject.points = picturePoints(cloud, readColors(path, info));
   subject.sensor_pose = cloud.sensor_pose;
   subject.seen = isSeenFrom(cloud.sensor_pose, subject.points.positions);
-  if (!subject.seen && !settings.aside)
+  if (!subject.seen && !settings.aside && !settings.quiet)
     printNotice(path + ": not seen from a sensor, so drawn as with --view iso");
   return subject;
 }

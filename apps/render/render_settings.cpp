@@ -1,6 +1,7 @@
 #include "render_settings.h"
 
 #include "command_line.h"
+#include "common_options.h"
 
 #include <CLI/CLI.hpp>
 
@@ -20,11 +21,11 @@ parsePair(const std::string& text, char separator)
   const std::size_t at = text.find(separator);
   if (at == std::string::npos)
     return std::nullopt;
-  std::pair<Number, Number> pair;
-  if (!CLI::detail::lexical_cast(text.substr(0, at), pair.first) ||
-      !CLI::detail::lexical_cast(text.substr(at + 1), pair.second))
+  const auto first = parseNumber<Number>(text.substr(0, at));
+  const auto second = parseNumber<Number>(text.substr(at + 1));
+  if (!first || !second)
     return std::nullopt;
-  return pair;
+  return std::pair(*first, *second);
 }
 
 /// An option whose text is understood by `parse`, which returns what is wrong with it.
@@ -51,7 +52,7 @@ parseColoring(const std::string& text, RenderSettings& settings)
   settings.measure = nullptr;
   std::string known = kByType;
   for (const Measure& measure : measures()) {
-    if (text == measure.name)
+    if (isSameName(text, measure.name))
       settings.measure = &measure;
     known += ", " + measure.name;
   }
@@ -82,7 +83,7 @@ parseSize(const std::string& text, RenderSettings& settings)
   const auto size = parsePair<int>(text, 'x');
   if (!size || std::min(size->first, size->second) < kLeast ||
       std::max(size->first, size->second) > kMost)
-    return "is no WIDTHxHEIGHT from 200x200 to 4096x4096";
+    return "is not WIDTHxHEIGHT, from 200x200 to 4096x4096";
   settings.width = size->first;
   settings.height = size->second;
   return "";
@@ -135,6 +136,7 @@ addSubjectOptions(CLI::App& command, RenderSettings& settings)
                 "The ten types of patches instead of results")
       ->excludes(cloud);
   addSensorOptions(command, settings.input);
+  addQuietOption(command, settings.quiet);
 }
 
 void

@@ -30,6 +30,7 @@ struct RenderSettings {
   double zoom = 1.0;
   Rgb background{255, 255, 255};
   std::optional<int> max_patches; ///< of one result
+  bool quiet = false; ///< errors only
   InputOptions input; ///< of clouds that are depth images
 };
 

@@ -469,20 +469,6 @@ io::checkPointCount(std::uint64_t points, std::uint64_t max_points)
                     max_points));
 }
 
-std::string_view
-axesName(CloudAxes axes)
-{
-  switch (axes) {
-  case CloudAxes::Camera:
-    return "x-right,y-down,z-forward";
-  case CloudAxes::OpenGl:
-    return "opengl";
-  case CloudAxes::Ros:
-    return "ros";
-  }
-  return "unknown";
-}
-
 Eigen::Matrix3d
 turnFromCamera(CloudAxes axes)
 {

@@ -1,4 +1,5 @@
 #include <holdfast/fit/names.h>
+#include <holdfast/io/names.h>
 #include <holdfast/io/patch_io.h>
 #include <holdfast/patch/tessellation.h>
 #include <holdfast/pcl/conversions.h>
@@ -87,7 +88,7 @@ inputJson(const CloudFileInfo& file)
   for (Eigen::Index i = 0; i < 3; ++i)
     rows.push_back(vectorJson(turn.row(i)));
   return {{"format", file.format},
-          {"axes", axesName(file.axes)},
+          {"axes", kCloudAxesNames.of(file.axes)},
           {"turn", rows},
           {"unit_m", file.unit_m},
           {"zero_points", file.zero_points},
@@ -377,7 +378,9 @@ void
 writeMeshText(std::ostream& out, const ColoredMesh& mesh, bool in_double)
 {
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
-    const Eigen::Vector3d& v = mesh.vertices[i];
+    const Eigen::Vector3d& vertex = mesh.vertices[i];
+    const Eigen::Vector3d v =
+        in_double ? vertex : vertex.cast<float>().cast<double>().eval();
     const auto& color = mesh.colors[i];
     // Digits that give the value back in the precision it is read with.
     const int digits = in_double ? 17 : 9;

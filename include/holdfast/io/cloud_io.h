@@ -8,7 +8,6 @@
 #include <limits>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace holdfast {
@@ -19,9 +18,6 @@ enum class CloudAxes {
   OpenGl, ///< x right, y up, z back
   Ros ///< x forward, y left, z up
 };
-
-/// "x-right,y-down,z-forward", "opengl", "ros", as in --axes and the JSON.
-std::string_view axesName(CloudAxes axes);
 
 /// The rotation T with q_axes = T q_camera, camera axes x right, y down, z forward.
 Eigen::Matrix3d turnFromCamera(CloudAxes axes);

@@ -3,6 +3,7 @@
 
 #include <holdfast/patch/names.h>
 #include <holdfast/pcl/neighborhood_sampler.h>
+#include <holdfast/pcl/patch_extraction.h>
 
 namespace holdfast {
 
@@ -11,5 +12,8 @@ inline constexpr EnumNames<Neighborhood, 4> kNeighborhoodNames{
 
 inline constexpr EnumNames<SeedStrategy, 3> kSeedStrategyNames{
     {"grid", "random", "poisson"}};
+
+inline constexpr EnumNames<NormalSide, 3> kNormalSideNames{
+    {"viewpoint", "outward", "up"}};
 
 } // namespace holdfast

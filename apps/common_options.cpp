@@ -1,0 +1,44 @@
+#include "common_options.h"
+
+#include <CLI/CLI.hpp>
+
+namespace holdfast::app {
+
+CLI::Option*
+addQuietOption(CLI::App& command, bool& quiet)
+{
+  return command
+      .add_flag("--quiet", quiet, "Errors only: no table, notices or progress")
+      ->group("Output");
+}
+
+CLI::Option*
+addThreadsOption(CLI::App& command, int& threads)
+{
+  return command
+      .add_option("--threads",
+                  threads,
+                  "Threads to use, 0: all cores; results do not depend on it")
+      ->check(CLI::Range(0, 4096, "N"))
+      ->type_name("")
+      ->capture_default_str()
+      ->group("Run");
+}
+
+CLI::Option*
+addJsonOption(CLI::App& command,
+              std::string& path,
+              const std::string& layout,
+              const std::string& former_name)
+{
+  return command
+      .add_option("--json" + (former_name.empty() ? "" : "," + former_name),
+                  path,
+                  "Write JSON to this file, or with - to standard output and nothing "
+                  "else there" +
+                      (layout.empty() ? "" : "; " + layout))
+      ->type_name("FILE")
+      ->group("Output");
+}
+
+} // namespace holdfast::app
