@@ -208,31 +208,48 @@ TEST_F(ProgramFaults, TheNextRunRemovesWhatAKilledOneLeft)
   EXPECT_EQ(filesIn(out), Names{"result.json"});
 }
 
-/// Runs a command with less and less memory, down to what it cannot even be loaded in.
+/// Runs a command with little more memory than the system needs to load the program.
 class LittleMemory : public ProgramFaults {
 protected:
+  ProgramRun runWithin(int megabytes, const std::string& command) const
+  {
+    const std::string out = folder_ + "/out";
+    fs::remove_all(out);
+    fs::create_directories(out);
+    return shell("ulimit -c 0; ulimit -v " + std::to_string(1024 * megabytes) +
+                 "\ncd " + shellQuoted(out) + "\n$HOLDFAST " + command);
+  }
+
+  /// The least in which it is loaded, MB.
+  int leastToLoad() const
+  {
+    constexpr int kNotLoaded = 127;
+    int too_little = 0, enough = 2000;
+    while (enough - too_little > 1) {
+      const int between = (too_little + enough) / 2;
+      const bool loaded = runWithin(between, "--version").exit_code != kNotLoaded;
+      (loaded ? enough : too_little) = between;
+    }
+    return enough;
+  }
+
   void expectOneLineOrSuccess(const std::string& command, const Names& files)
   {
     if (kIsSanitized)
       GTEST_SKIP() << "sanitizers need more memory than that";
-    const std::string out = folder_ + "/out";
+    const int least = leastToLoad();
     int failures = 0;
-    for (int megabytes = 600; megabytes > 20; megabytes -= megabytes > 150 ? 30 : 7) {
-      fs::remove_all(out);
-      fs::create_directories(out);
-      const ProgramRun run =
-          shell("ulimit -c 0; ulimit -v " + std::to_string(1024 * megabytes) + "\ncd " +
-                shellQuoted(out) + "\n$HOLDFAST " + command);
-      SCOPED_TRACE(std::to_string(megabytes) + " MB: " + run.err);
-      if (run.exit_code == 127) // the system cannot load the program
-        break;
+    for (const int more : {0, 2, 4, 6, 8, 10, 13, 16, 20, 25, 30, 40, 60, 100, 1000}) {
+      const ProgramRun run = runWithin(least + more, command);
+      SCOPED_TRACE(std::to_string(least + more) + " MB: " + run.err);
       ASSERT_TRUE(run.exit_code == 0 || run.exit_code == 1) << run.exit_code;
-      EXPECT_EQ(filesIn(out), run.exit_code == 0 ? files : Names{});
+      EXPECT_EQ(filesIn(folder_ + "/out"), run.exit_code == 0 ? files : Names{});
       if (run.exit_code == 1)
-        expectOneLine(run, "");
+        expectOneLine(run, "memory");
       failures += run.exit_code;
     }
-    std::cout << failures << " of the runs failed\n";
+    EXPECT_GT(failures, 0) << "there was enough in every run";
+    EXPECT_LT(failures, 15) << "there was too little in every run";
   }
 };
 

@@ -37,12 +37,10 @@ commandsBelow(const Words& command)
   while (std::getline(help, line) && line.rfind("Subcommands:", 0) != 0) {}
   std::vector<Words> commands;
   while (std::getline(help, line) && line.rfind("  ", 0) == 0) {
-    const std::size_t end = line.find(' ', 2);
     if (line[2] == ' ')
       continue; // a description goes on
     Words below = command;
     below.push_back(line.substr(2, line.find_first_of(" ,", 2) - 2));
-    EXPECT_NE(end, 2U);
     for (const Words& found : commandsBelow(below))
       commands.push_back(found);
   }
@@ -97,18 +95,20 @@ TEST(ProgramOptions, EveryCommandSaysTheSameAboutThem)
               "Errors only: no table, notices or progress");
     const std::string threads = descriptionOf(help, "--threads");
     with_threads += !threads.empty();
-    if (!threads.empty())
+    if (!threads.empty()) {
       EXPECT_NE(
           threads.find("Threads to use, 0: all cores; results do not depend on it"),
           std::string::npos)
           << threads;
+    }
     const std::string json = descriptionOf(help, "--json");
     with_json += !json.empty();
-    if (!json.empty())
+    if (!json.empty()) {
       EXPECT_NE(json.find("Write JSON to this file, or with - to standard output and "
                           "nothing else there"),
                 std::string::npos)
           << json;
+    }
   }
   EXPECT_GE(with_threads, 7); // fit and the experiments
   EXPECT_GE(with_json, 9); // these, info and calibrate
@@ -118,11 +118,13 @@ TEST(ProgramOptions, EveryCommandSaysTheSameAboutThem)
 std::vector<Words>
 workingCommands()
 {
-  const std::string cloud = kFolder + "/bowl.pcd";
+  const std::string cloud = kFolder + "/bowl.pcd", flat = kFolder + "/table.pcd";
   saveCloud(cloud, test::bowlCloud(96, 64));
+  const Words simulation{"simulate", "table", "--quiet", "-o", flat};
+  EXPECT_EQ(runProgram(kFolder, simulation).exit_code, 0);
   return {{"fit", cloud, "--whole"},
           {"info", cloud},
-          {"calibrate", cloud, "--region", "32"},
+          {"calibrate", flat},
           {"experiment", "consistency", "--trials", "2", "--threads", "2"},
           {"experiment", "calibration", "--trials", "2", "--threads", "0"}};
 }
