@@ -2,6 +2,8 @@
 
 #include "console.h"
 
+#include <holdfast/geometry/constants.h>
+
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -63,25 +65,15 @@ heading(const PatchReport& report)
 } // namespace
 
 double
-chi2PerDof(const FitResult& fit)
-{
-  return fit.chi2_dof > 0 ? fit.chi2 / fit.chi2_dof : 0.0;
-}
-
-/// A turn by delta about the local x and y axes moves the normal by as much.
-double
 normalSigmaDegrees(const FitResult& fit)
 {
-  const ParameterMatrix tangent = toTangent(fit.patch, fit.covariance);
-  const int r = layoutOf(fit.patch.type).r();
-  return std::sqrt(tangent(r, r) + tangent(r + 1, r + 1)) * 180.0 / M_PI;
+  return normalSigma(fit) * 180.0 / kPi;
 }
 
 double
 centreSigmaMillimetres(const FitResult& fit)
 {
-  const int c = layoutOf(fit.patch.type).c();
-  return 1e3 * std::sqrt(fit.covariance.diagonal().segment(c, 3).sum());
+  return 1e3 * centreSigma(fit);
 }
 
 std::string

@@ -7,14 +7,9 @@
 
 namespace holdfast::app {
 
-/// Rms angle between the fitted and the noise-free normal, from the covariance.
+/// normalSigma() and centreSigma() in the units that people read.
 double normalSigmaDegrees(const FitResult& fit);
-
-/// Rms distance between the fitted and the noise-free centre, from the covariance.
 double centreSigmaMillimetres(const FitResult& fit);
-
-/// 0 where there is no degree of freedom.
-double chi2PerDof(const FitResult& fit);
 
 /// A heading, medians per surface type, and what was rejected.
 std::string summaryTable(const PatchReport& report);

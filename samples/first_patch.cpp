@@ -1,12 +1,11 @@
-// From a cloud to patches in a few lines: prints every patch of a PCD file, its normal
-// and how sure its height along that normal is.
+// From a cloud to patches in a few lines: prints every patch of a PCD file, its normal,
+// how sure that and the height along it are, and how well the points fit.
 //
 //   first_patch samples/rocks.pcd
 #include <holdfast/io/cloud_io.h>
 #include <holdfast/io/config.h>
 #include <holdfast/pcl/patch_extraction.h>
 
-#include <cmath>
 #include <exception>
 #include <iostream>
 #include <string>
@@ -20,10 +19,10 @@ printPatches(const std::string& path)
   const auto result = holdfast::extractPatches(cloud, sensor, {});
   for (const holdfast::ExtractedPatch& found : result.patches) {
     const Eigen::Vector3d n = found.fit.patch.normal();
-    // The covariance is that of [d | k | r | c]: the centre c comes last.
-    const Eigen::Matrix3d centre = found.fit.covariance.bottomRightCorner<3, 3>();
     std::cout << holdfast::surfaceName(found.fit.patch.type.surface) << "  normal "
-              << n.transpose() << "  sigma " << std::sqrt(n.dot(centre * n)) << " m\n";
+              << n.transpose() << " sigma " << holdfast::normalSigma(found.fit)
+              << " rad, height sigma " << holdfast::centreSigma(found.fit, n)
+              << " m, chi2/dof " << holdfast::chi2PerDof(found.fit) << '\n';
   }
 }
 // [end]

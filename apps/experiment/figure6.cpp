@@ -104,7 +104,7 @@ patchRow(const Rock& rock, int index, const ExperimentSettings& settings)
               {"surface", surfaceName(fit.patch.type.surface)},
               {"status", statusName(fit.status)},
               {"points", fit.points},
-              {"chi2_per_dof", fit.chi2 / fit.chi2_dof},
+              {"chi2_per_dof", chi2PerDof(fit)},
               {"range_m", (fit.patch.c - rock.image.sensor_pose.c).norm()}};
   for (const Metric& metric : kMetrics) {
     if (metric.value == &PatchMetrics::phi_k &&

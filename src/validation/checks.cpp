@@ -43,8 +43,7 @@ check(const FitResult& fit, const Points& points, const ValidationOptions& optio
       fit.patch.principalCurvatures().lpNorm<Eigen::Infinity>();
   validation.residual = measureResidual(fit.patch, points);
   validation.coverage = measureCoverage(fit.patch, points, options.coverage);
-  if (fit.chi2_dof > 0)
-    validation.chi2_per_dof = fit.chi2 / fit.chi2_dof;
+  validation.chi2_per_dof = chi2PerDof(fit);
   validation.verdict = judge(validation, options);
   return validation;
 }

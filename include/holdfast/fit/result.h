@@ -60,4 +60,21 @@ struct FitResult {
   NullSpace null_space = NullSpace(6, 0);
 };
 
+/// How far the normal may be off: the rms angle between the fitted normal and that of
+/// the points without noise, rad, from the covariance. NaN when not usable.
+double normalSigma(const FitResult& fit);
+
+/// How far the centre c may be off: the rms distance, m, from the covariance. NaN when
+/// not usable.
+double centreSigma(const FitResult& fit);
+
+/// Standard deviation, m, of the centre along a direction in the frame of the patch's
+/// coordinates: along the patch's normal, of the surface's height. NaN when not usable.
+/// \param direction of any length but zero.
+double centreSigma(const FitResult& fit, const Eigen::Vector3d& direction);
+
+/// chi2 / chi2_dof: about 1 where surface and noise model are right. Zero without
+/// degrees of freedom.
+double chi2PerDof(const FitResult& fit);
+
 } // namespace holdfast
