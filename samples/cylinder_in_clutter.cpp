@@ -43,7 +43,7 @@ print(const holdfast::FitResult& fit)
   const double sigma = radius * radius * std::sqrt(fit.covariance(2, 2));
   std::cout << "radius " << 1e3 * radius << " mm, sigma " << 1e3 * sigma << " mm\n"
             << "axis " << fit.patch.pose().R.col(0).transpose() << '\n'
-            << "chi2/dof " << fit.chi2 / fit.chi2_dof << ", " << fit.points
+            << "chi2/dof " << holdfast::chi2PerDof(fit) << ", " << fit.points
             << " points\n";
 }
 
@@ -64,8 +64,11 @@ run(const std::string& path, int column, int row)
                                           cubeAround(cloud, center));
   model->setSensor(holdfast::loadSensor("kinect_v1"));
   model->setRadiusLimits(0.01, 0.1);
-  // Near or far, a point within three of its own sigmas is an inlier.
-  pcl::RandomSampleConsensus<pcl::PointXYZ> ransac(model, 3.0);
+  // Near or far, a point within three of its own sigmas is an inlier: with a sensor,
+  // the model measures distances in sigmas, and PCL passes its threshold on to the
+  // model.
+  constexpr double kSigmas = 3.0;
+  pcl::RandomSampleConsensus<pcl::PointXYZ> ransac(model, kSigmas);
   ransac.setMaxIterations(10000);
   if (!ransac.computeModel() || !ransac.refineModel())
     return 1;

@@ -81,7 +81,7 @@ largestOfAll(Segmentation& segmentation, pcl::Indices& inliers)
        {pcl::SACMODEL_PLANE, pcl::SACMODEL_SPHERE, pcl::SACMODEL_CYLINDER}) {
     pcl::PointIndices on_surface;
     const holdfast::FitResult fit = largest(segmentation, kind, on_surface);
-    if (holdfast::isUsable(fit.status) && fit.chi2 < 0.9 * fit.chi2_dof &&
+    if (holdfast::isUsable(fit.status) && holdfast::chi2PerDof(fit) < 0.9 &&
         fit.points > 1.05 * best.points) {
       best = fit;
       inliers = on_surface.indices;
@@ -138,7 +138,7 @@ run(const std::string& path)
   segmentation.setInputCloud(cloud);
   segmentation.setSensor(holdfast::loadSensor("kinect_v1"));
   segmentation.setMethodType(pcl::SAC_RANSAC);
-  segmentation.setDistanceThreshold(2.0); // sigmas of each point
+  segmentation.setSigmaThreshold(2.0); // of each point's own noise
   segmentation.setRadiusLimits(0.02, 0.12);
   segmentation.setMaxIterations(5000);
   segmentation.setProbability(0.9999);

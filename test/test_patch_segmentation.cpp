@@ -36,7 +36,7 @@ prepare(PatchSegmentation<PointT>& segmentation, int model_type)
 {
   segmentation.setModelType(model_type);
   segmentation.setMethodType(pcl::SAC_RANSAC);
-  segmentation.setDistanceThreshold(kThreeSigmas);
+  segmentation.setSigmaThreshold(kThreeSigmas);
   segmentation.setProbability(0.9999);
   segmentation.setMaxIterations(10000);
 }
@@ -151,7 +151,7 @@ TEST(PatchSegmentation, TakesItsNoiseFromASensorOrFromTheInliers)
   Sensor sensor;
   sensor.noise = scene.noise;
   segmentation.setSensor(sensor);
-  segmentation.setDistanceThreshold(kThreeSigmas);
+  segmentation.setSigmaThreshold(kThreeSigmas);
   segment(segmentation);
   expectPatch(scene, segmentation.getPatch());
 }

@@ -331,7 +331,7 @@ protected:
     segmentation.setInputCovariances(input_.covariances);
     segmentation.setModelType(model);
     segmentation.setMethodType(method);
-    segmentation.setDistanceThreshold(3.0);
+    segmentation.setSigmaThreshold(3.0);
     segmentation.setMaxIterations(20); // LMedS makes them all
     pcl::ModelCoefficients coefficients;
     segmentation.segment(inliers, coefficients);

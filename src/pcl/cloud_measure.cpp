@@ -128,7 +128,8 @@ shortNumber(double value)
 {
   char text[32];
   // %g would write 1520 as 1.52e+03.
-  std::snprintf(text, sizeof text, std::abs(value) >= 1000.0 ? "%.0f" : "%.3g", value);
+  const bool long_digits = std::abs(value) >= 1e3 && std::abs(value) < 1e7;
+  std::snprintf(text, sizeof text, long_digits ? "%.0f" : "%.3g", value);
   return text;
 }
 

@@ -3,9 +3,12 @@
 #include <holdfast/validation/residual.h>
 
 #include "point_gatherer.h"
+#include "sac_doubts.h"
 #include "sac_surface.h"
 
 #include <pcl/common/point_tests.h>
+
+#include <Eigen/Eigenvalues>
 
 #include <algorithm>
 #include <cmath>
@@ -98,6 +101,10 @@ struct PatchConsensus::Impl {
                                     const std::vector<int>& indices) const;
   void gather(const Patch& patch, const std::vector<int>& inliers, PointBatch&) const;
   double noiseSigma(const Patch& patch, const std::vector<int>& inliers) const;
+  bool inMetres() const;
+  double medianNoise(const pcl::Indices& indices) const;
+  ConsensusFacts facts(const ConsensusLimits& limits,
+                       const pcl::Indices& indices) const;
 
   const SacSurface& surface;
   RangeCloud cloud;
@@ -204,6 +211,58 @@ PatchConsensus::Impl::noiseSigma(const Patch& patch,
   return std::max(std::sqrt(sum / std::max(dof, 1)), options.fit.sigma_floor_m);
 }
 
+bool
+PatchConsensus::Impl::inMetres() const
+{
+  return options.distance == ConsensusDistance::Euclidean || !distance_gatherer;
+}
+
+// Over a sample of the points, always the same; NaN where none has a usable covariance.
+double
+PatchConsensus::Impl::medianNoise(const pcl::Indices& indices) const
+{
+  constexpr std::size_t kMost = 256;
+  const std::size_t count = std::min(kMost, indices.size());
+  pcl::Indices sample;
+  for (std::size_t i = 0; i < count; ++i)
+    sample.push_back(indices[i * indices.size() / count]);
+  const std::vector<int> points = usable(sample);
+  std::vector<double> sigmas;
+  if (!points.empty() && distance_gatherer) {
+    PointBatch batch;
+    distance_gatherer->gather(points, position(points.front()), batch);
+    for (int i = 0; i < batch.size(); ++i)
+      if (const Eigen::Matrix3d Sigma = batch.covariance(i); Sigma.allFinite()) {
+        const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(
+            Sigma,
+            Eigen::EigenvaluesOnly);
+        if (solver.eigenvalues()[0] >= 0.0)
+          sigmas.push_back(std::sqrt(solver.eigenvalues()[2]));
+      }
+  }
+  if (sigmas.empty())
+    return std::numeric_limits<double>::quiet_NaN();
+  const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
+  std::nth_element(sigmas.begin(), middle, sigmas.end());
+  return *middle;
+}
+
+ConsensusFacts
+PatchConsensus::Impl::facts(const ConsensusLimits& limits,
+                            const pcl::Indices& indices) const
+{
+  ConsensusFacts facts;
+  facts.cloud = measureCloud(*cloud.points, cloud.sensor_pose.c);
+  facts.limits = limits;
+  facts.unit =
+      inMetres() ? ConsensusDistance::Euclidean : ConsensusDistance::Mahalanobis;
+  facts.for_want_of_noise = options.distance != facts.unit;
+  facts.noise_known = distance_gatherer != nullptr;
+  facts.noise_m = medianNoise(indices);
+  facts.curved = surface.model != kernel::Model::Plane;
+  return facts;
+}
+
 void
 PatchConsensus::Impl::gather(const Patch& patch,
                              const std::vector<int>& inliers,
@@ -285,6 +344,46 @@ PatchConsensus::modelSize() const
   return impl_->surface.model_size;
 }
 
+std::string
+PatchConsensus::sampleError(const pcl::Indices& indices) const
+{
+  unsigned int finite = 0;
+  for (auto i = indices.begin(); i != indices.end() && finite < sampleSize(); ++i)
+    if (impl_->isUsable(*i))
+      ++finite;
+  if (finite == sampleSize())
+    return {};
+  const std::string points = "of the " + std::to_string(indices.size()) + " points";
+  if (finite == 0 && !indices.empty())
+    return "none " + points + " is finite";
+  return "a sample takes " + std::to_string(sampleSize()) + " points, but " +
+         std::to_string(finite) + ' ' + points + " are finite";
+}
+
+ConsensusDistance
+PatchConsensus::distanceUnit() const
+{
+  return impl_->inMetres() ? ConsensusDistance::Euclidean :
+                             ConsensusDistance::Mahalanobis;
+}
+
+std::vector<std::string>
+PatchConsensus::doubts(const ConsensusLimits& limits, const pcl::Indices& indices) const
+{
+  if (!impl_->input_error.empty())
+    return {impl_->input_error};
+  return doubtsAbout(impl_->facts(limits, indices));
+}
+
+std::string
+PatchConsensus::explainNothing(const ConsensusLimits& limits,
+                               const pcl::Indices& indices) const
+{
+  if (!impl_->input_error.empty())
+    return "no patch: " + impl_->input_error;
+  return whyNothing(impl_->facts(limits, indices));
+}
+
 bool
 PatchConsensus::isSample(const pcl::Indices& sample) const
 {
@@ -325,8 +424,7 @@ PatchConsensus::squaredDistances(const Patch& surface,
                                  const pcl::Indices& indices) const
 {
   constexpr std::size_t kBlock = 512; // points that fit into the caches together
-  const bool metres = impl_->options.distance == ConsensusDistance::Euclidean ||
-                      !impl_->distance_gatherer;
+  const bool metres = impl_->inMetres();
   std::vector<double> squared(indices.size(), kInfinity);
   std::vector<int> block;
   std::vector<std::size_t> slots;

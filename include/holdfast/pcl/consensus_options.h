@@ -25,7 +25,8 @@ enum PatchSacModel : int {
 /// The surface of a model type of PCL's or ours; nothing for lines, circles, ...
 std::optional<SurfaceRequest> surfaceOfModelType(int model_type);
 
-/// What distances and thresholds are measured in.
+/// What distances and thresholds are measured in: a number like PCL's 0.01 means quite
+/// another thing in sigmas. Of an unlikely one the classes warn.
 enum class ConsensusDistance : std::uint8_t {
   /// Standard deviations of the point's noise, by the residual that the fit minimises:
   /// a threshold of 3 keeps 99.7 % of the points of the surface, near and far. Metres
@@ -35,6 +36,8 @@ enum class ConsensusDistance : std::uint8_t {
 };
 
 struct ConsensusOptions {
+  /// Of SampleConsensusModelPatch. PatchSegmentation goes by the threshold that was
+  /// set: setSigmaThreshold() or setDistanceThreshold().
   ConsensusDistance distance = ConsensusDistance::Mahalanobis;
   /// fit.surface is that of the model; fit.viewpoint is set from the sensor pose.
   FitOptions fit;

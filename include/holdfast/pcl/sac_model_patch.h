@@ -7,7 +7,9 @@
 
 #include <pcl/sample_consensus/sac_model.h>
 
+#include <array>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,15 +17,15 @@
 namespace holdfast {
 
 class PatchConsensus;
+struct ConsensusLimits;
 
 /// A surface for PCL's sample consensus, fitted with the covariances of the points:
 ///
 ///   auto model = pcl::make_shared<SampleConsensusModelPatch<pcl::PointXYZ>>(
 ///       SurfaceRequest::Sphere, cloud);
 ///   model->setSensor(loadSensor("kinect_v1"));
-///   pcl::RandomSampleConsensus<pcl::PointXYZ> ransac(model, 3.0); // sigmas
-///   ransac.computeModel();
-///   ransac.refineModel();
+///   pcl::RandomSampleConsensus<pcl::PointXYZ> ransac(model, 3.0); // sigmas, not
+///   metres ransac.computeModel(); ransac.refineModel();
 ///   ... getInliers(inliers), getModelCoefficients(coefficients)
 ///   FitResult patch = model->estimatePatch(inliers, coefficients);
 ///
@@ -44,7 +46,12 @@ class PatchConsensus;
 /// (PointXYZCovariance), else from setNoiseModel() or setSensor(). Distances and
 /// thresholds are in sigmas of it. Without any, they are in metres, as PCL's, and the
 /// fit takes the noise to be the same for all points and all directions, and of the
-/// size that the inliers' distances show. setOptions() asks for metres in any case.
+/// size that the inliers' distances show. setOptions() asks for metres in any case;
+/// getDistanceUnit() tells which of them it is.
+///
+/// Where RANSAC or PROSAC hand the model a threshold, or limits, that do not go with
+/// its unit and the cloud, a PCL_WARN says so, once: 0.01 sigmas, 3 m, a cloud in
+/// millimetres. The other methods keep the threshold to themselves: ask getNotices().
 ///
 /// setRadiusLimits() bounds the radius of curvature of curved surfaces, for paraboloids
 /// that of the stronger curvature.
@@ -109,6 +116,20 @@ public:
   /// A value of pcl::SacModel or PatchSacModel.
   pcl::SacModel getModelType() const override;
 
+  /// What distances and thresholds are in: metres (Euclidean), too, where nothing is
+  /// known of the noise.
+  ConsensusDistance getDistanceUnit() const;
+
+  /// What is doubtful about the cloud, its noise, the radius limits and a threshold of
+  /// distances, one line each: what was given, what was expected, the likely cause. The
+  /// use of that threshold does not warn of them any more.
+  std::vector<std::string> getNotices(double threshold) const;
+
+  /// One line on a search with a threshold that found nothing: validity, extent and
+  /// point spacing of the cloud beside noise, threshold and radius limits, and the
+  /// likely cause.
+  std::string explainNothing(double threshold) const;
+
   /// Empty when there is input to take samples from, else what is wrong with it.
   std::string misuse() const;
 
@@ -171,11 +192,17 @@ private:
   void initialize();
   void updateCloud();
   std::optional<Patch> validSurface(const Eigen::VectorXf& model_coefficients) const;
+  ConsensusLimits limits(double threshold) const;
+  bool isNew(const ConsensusLimits& limits) const;
+  void warnOnce(double threshold) const;
 
   std::unique_ptr<PatchConsensus> engine_;
   RangeCloud range_; ///< the input cloud with the covariances of its own points
   CovariancesConstPtr covariances_;
   std::optional<Pose> sensor_pose_;
+  /// Threshold and radii that were spoken of; PCL counts inliers in many threads.
+  mutable std::mutex notice_mutex_;
+  mutable std::optional<std::array<double, 3>> noticed_;
 };
 
 } // namespace holdfast

@@ -8,6 +8,7 @@
 
 #include <pcl/types.h>
 
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -19,6 +20,13 @@ namespace holdfast {
 /// instruction set.
 using SurfaceCoefficients =
     Eigen::Matrix<float, Eigen::Dynamic, 1, Eigen::DontAlign, 8, 1>;
+
+/// What a search is told to keep.
+struct ConsensusLimits {
+  double threshold = 0.0; ///< of distances, in their unit
+  double radius_min_m = -std::numeric_limits<double>::max(); ///< PCL's "no limit"
+  double radius_max_m = std::numeric_limits<double>::max();
+};
 
 /// A cloud, the noise of its points, and one kind of surface to look for in it.
 ///
@@ -50,6 +58,22 @@ public:
   int modelType() const;
   unsigned int sampleSize() const;
   unsigned int modelSize() const;
+
+  /// Empty when the indices hold as many finite points as a sample takes, else what is
+  /// missing.
+  std::string sampleError(const pcl::Indices& indices) const;
+
+  /// What distances are in: metres, too, where nothing is known of the noise.
+  ConsensusDistance distanceUnit() const;
+
+  /// What is doubtful about the cloud, its noise and the limits, one line each: what
+  /// was given, what was expected, the likely cause. Looks at the whole cloud once.
+  std::vector<std::string> doubts(const ConsensusLimits& limits,
+                                  const pcl::Indices& indices) const;
+
+  /// Why a search found nothing, in one line.
+  std::string explainNothing(const ConsensusLimits& limits,
+                             const pcl::Indices& indices) const;
 
   /// True for as many points as a sample has, all of them finite.
   bool isSample(const pcl::Indices& sample) const;

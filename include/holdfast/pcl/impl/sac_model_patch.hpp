@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 namespace holdfast {
@@ -46,6 +47,7 @@ void
 SampleConsensusModelPatch<PointT>::setNoiseModel(const NoiseModel::ConstPtr& noise)
 {
   engine_->setNoiseModel(noise);
+  noticed_.reset();
 }
 
 template <typename PointT>
@@ -112,6 +114,7 @@ SampleConsensusModelPatch<PointT>::updateCloud()
   if (sensor_pose_)
     cloud.sensor_pose = *sensor_pose_;
   engine_->setCloud(cloud);
+  noticed_.reset();
 }
 
 template <typename PointT>
@@ -119,12 +122,74 @@ void
 SampleConsensusModelPatch<PointT>::setOptions(const ConsensusOptions& options)
 {
   const std::string error = validityError(options.fit);
-  if (error.empty())
-    engine_->setOptions(options);
-  else
+  if (!error.empty()) {
     PCL_ERROR("[holdfast::%s::setOptions] %s!\n",
               getClassName().c_str(),
               error.c_str());
+    return;
+  }
+  engine_->setOptions(options);
+  noticed_.reset();
+}
+
+template <typename PointT>
+ConsensusDistance
+SampleConsensusModelPatch<PointT>::getDistanceUnit() const
+{
+  return engine_->distanceUnit();
+}
+
+template <typename PointT>
+ConsensusLimits
+SampleConsensusModelPatch<PointT>::limits(double threshold) const
+{
+  return {threshold, radius_min_, radius_max_};
+}
+
+// True once for the same limits and input.
+template <typename PointT>
+bool
+SampleConsensusModelPatch<PointT>::isNew(const ConsensusLimits& limits) const
+{
+  const std::array<double, 3> key{limits.threshold,
+                                  limits.radius_min_m,
+                                  limits.radius_max_m};
+  const std::lock_guard<std::mutex> lock(notice_mutex_);
+  // Bytes, so that NaN is like NaN.
+  if (noticed_ && std::memcmp(noticed_->data(), key.data(), sizeof key) == 0)
+    return false;
+  noticed_ = key;
+  return true;
+}
+
+template <typename PointT>
+std::vector<std::string>
+SampleConsensusModelPatch<PointT>::getNotices(double threshold) const
+{
+  isNew(limits(threshold));
+  if (!input_)
+    return {"no input cloud"};
+  return engine_->doubts(limits(threshold), *indices_);
+}
+
+template <typename PointT>
+void
+SampleConsensusModelPatch<PointT>::warnOnce(double threshold) const
+{
+  if (!isNew(limits(threshold)) || !misuse().empty())
+    return;
+  for (const std::string& doubt : engine_->doubts(limits(threshold), *indices_))
+    PCL_WARN("[holdfast::%s] %s\n", getClassName().c_str(), doubt.c_str());
+}
+
+template <typename PointT>
+std::string
+SampleConsensusModelPatch<PointT>::explainNothing(double threshold) const
+{
+  const std::string error = misuse();
+  if (!error.empty())
+    return "no patch: " + error;
+  return engine_->explainNothing(limits(threshold), *indices_);
 }
 
 template <typename PointT>
@@ -135,10 +200,8 @@ SampleConsensusModelPatch<PointT>::misuse() const
     return "no input cloud";
   if (!engine_->inputError().empty())
     return engine_->inputError();
-  if (indices_->size() < sample_size_)
-    return "a sample takes " + std::to_string(sample_size_) +
-           " points, but there are " + std::to_string(indices_->size());
-  return detail::inputError(*input_, *indices_);
+  const std::string error = detail::inputError(*input_, *indices_);
+  return error.empty() ? engine_->sampleError(*indices_) : error;
 }
 
 template <typename PointT>
@@ -259,6 +322,7 @@ SampleConsensusModelPatch<PointT>::selectWithinDistance(
   const std::optional<Patch> surface = validSurface(model_coefficients);
   if (!surface)
     return;
+  warnOnce(threshold);
   const std::vector<double> squared = engine_->squaredDistances(*surface, *indices_);
   for (std::size_t i = 0; i < squared.size(); ++i)
     if (std::sqrt(squared[i]) <= threshold) {
@@ -276,6 +340,7 @@ SampleConsensusModelPatch<PointT>::countWithinDistance(
   const std::optional<Patch> surface = validSurface(model_coefficients);
   if (!surface)
     return 0;
+  warnOnce(threshold);
   const std::vector<double> squared = engine_->squaredDistances(*surface, *indices_);
   return static_cast<std::size_t>(
       std::count_if(squared.begin(), squared.end(), [threshold](double s) {
