@@ -7,8 +7,11 @@
 #include <holdfast/pcl/conversions.h>
 #include <holdfast/pcl/intrinsics.h>
 #include <holdfast/pcl/patch_estimation.h>
+#include <holdfast/pcl/patch_segmentation.h>
 
 #include <pcl/io/pcd_io.h>
+#include <pcl/sample_consensus/method_types.h>
+#include <pcl/segmentation/sac_segmentation.h>
 
 #include <gtest/gtest.h>
 
@@ -178,5 +181,72 @@ TEST_F(RecordedTables, RadiiRepeatBetweenPictures)
   // A bowl, upright and upside down.
   expectSame(t33.find("sphere", "outside", 40), t37.find("sphere", "outside", 30));
 }
+
+// ---- In place of PCL's class, with PCL's numbers
+
+using Segmentation = PatchSegmentation<pcl::PointXYZ>;
+
+std::size_t
+inliersOf(pcl::SACSegmentation<pcl::PointXYZ>& segmentation,
+          const pcl::PointCloud<pcl::PointXYZ>::ConstPtr& cloud)
+{
+  segmentation.setInputCloud(cloud);
+  segmentation.setModelType(pcl::SACMODEL_PLANE);
+  segmentation.setMethodType(pcl::SAC_RANSAC);
+  pcl::PointIndices inliers;
+  pcl::ModelCoefficients coefficients;
+  segmentation.segment(inliers, coefficients);
+  return inliers.indices.size();
+}
+
+class RecordedWalls : public testing::TestWithParam<std::string> {
+protected:
+  void SetUp() override
+  {
+    const std::string path = test::recordedCloud(GetParam() + ".pcd");
+    if (path.empty())
+      GTEST_SKIP() << "no recorded clouds: set HOLDFAST_DATA_DIR";
+    cloud_ = loadCloud(path).points;
+  }
+
+  pcl::PointCloud<pcl::PointXYZ>::ConstPtr cloud_;
+};
+
+TEST_P(RecordedWalls, HoldAsManyPointsAsPclFindsAtItsOwnThreshold)
+{
+  constexpr double kMetres = 0.01; // of PCL's tutorials
+  pcl::SACSegmentation<pcl::PointXYZ> theirs;
+  theirs.setDistanceThreshold(kMetres);
+  const auto expected = static_cast<double>(inliersOf(theirs, cloud_));
+  for (const bool with_sensor : {true, false}) {
+    Segmentation ours;
+    if (with_sensor)
+      ours.setSensor(loadSensor("kinect_v1"));
+    ours.setDistanceThreshold(kMetres);
+    const auto found = static_cast<double>(inliersOf(ours, cloud_));
+    // Both refine; ours until nothing changes.
+    EXPECT_NEAR(found / expected, 1.0, 0.02) << found << " of " << expected;
+    EXPECT_TRUE(isUsable(ours.getPatch().status));
+    EXPECT_TRUE(ours.getNotices().empty()) << ours.getNotices().front();
+  }
+}
+
+TEST_P(RecordedWalls, AreNotLostInSilenceToAThresholdOfTheWrongUnit)
+{
+  Segmentation segmentation;
+  segmentation.setSensor(loadSensor("kinect_v1"));
+  EXPECT_GT(inliersOf(segmentation, cloud_), 100'000U); // 3 sigmas
+  EXPECT_TRUE(segmentation.getNotices().empty()) << segmentation.getNotices().front();
+  segmentation.setSigmaThreshold(0.01);
+  EXPECT_LT(inliersOf(segmentation, cloud_), 10'000U);
+  ASSERT_EQ(segmentation.getNotices().size(), 1U);
+  EXPECT_NE(segmentation.getNotices()[0].find("0.01 sigmas"), std::string::npos);
+}
+
+INSTANTIATE_TEST_SUITE_P(All,
+                         RecordedWalls,
+                         testing::Values("mosd_static_learn17",
+                                         "pcl_milk_clorox_carpet"),
+                         [](const auto& test) { return test.param; });
 
 }} // namespace holdfast

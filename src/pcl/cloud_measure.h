@@ -35,7 +35,7 @@ struct CloudMeasure {
 
 /// From a sample of the points, always the same one: neighbours in the image of an
 /// organized cloud, else the nearest of all points. Takes one pass over the points and
-/// some 20 million distances at most, or 16 per point where these are more.
+/// some 5 million distances at most, or 16 per point where these are more.
 /// \param sensor_position for range_m, in the frame of the cloud.
 CloudMeasure measureCloud(
     const pcl::PointCloud<pcl::PointXYZ>& cloud,
