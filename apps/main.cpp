@@ -19,7 +19,7 @@ constexpr const char* kExamples = R"(Examples:
 
 This program was built by samples/quickstart.sh, which leaves out all commands but
 these two. From the folder of the project,
-  cmake -S . -B build -DHOLDFAST_QUICKSTART=OFF && cmake --build build
+  cmake -S . -B build && cmake --build build
 builds the others as well: live, record, render, calibrate, simulate, experiment.
 'holdfast COMMAND --help' explains a command.
 Exit codes: 0 all done, 1 something failed, 2 wrong usage.

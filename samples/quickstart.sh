@@ -26,17 +26,17 @@ shift $((OPTIND - 1))
 
 install_packages build
 # All the rest of the project takes several times as long to compile.
-build_in "$root/build" -DCMAKE_BUILD_TYPE=Release -DHOLDFAST_QUICKSTART=ON
+build_in "$root/build-quickstart" -DCMAKE_BUILD_TYPE=Release -DHOLDFAST_QUICKSTART=ON
 
 echo
-"$root/build/bin/holdfast" fit "$root/samples/rocks.pcd" -o "$results"
+"$root/build-quickstart/bin/holdfast" fit "$root/samples/rocks.pcd" -o "$results"
 echo
 echo "Results are in $results:"
 ls "$results"
 cat <<EOF
-The program is $root/build/bin/holdfast; try it with --help.
+The program is $root/build-quickstart/bin/holdfast; try it with --help.
 It has the commands fit and info and the covariance modes exact, gauss-newton and
 monte-carlo. To build everything, with live, record, render, calibrate, simulate,
 experiment, the classes for PCL pipelines, tests and samples:
-  cmake -S $root -B $root/build -DHOLDFAST_QUICKSTART=OFF && cmake --build $root/build
+  cmake -S $root -B $root/build && cmake --build $root/build
 EOF

@@ -34,6 +34,11 @@ add_test(NAME package_setup COMMAND ${support}/check_setup.sh)
 
 add_test(NAME readme_snippet COMMAND ${support}/check_readme.sh)
 
+if(TARGET doc)
+  add_test(NAME reference_pages
+    COMMAND ${CMAKE_COMMAND} --build ${PROJECT_BINARY_DIR} --target doc)
+endif()
+
 if(HOLDFAST_BUILD_SAMPLES)
   add_test(NAME sample_first_patch
     COMMAND first_patch ${PROJECT_SOURCE_DIR}/samples/rocks.pcd)
