@@ -84,8 +84,11 @@ printCurrentError(const char* subject) noexcept
     putLine(subject, "not enough memory");
   }
   catch (const std::system_error& error) {
-    // Of a thread, a lock or a folder, none of which the text names.
-    putLine(subject, error.what());
+    // Its text alone would not tell of what.
+    if (error.code() == std::errc::resource_unavailable_try_again)
+      putLine(subject, "the system has no more threads to give");
+    else
+      putLine(subject, error.what());
   }
   catch (const std::exception& error) {
     putLine(nullptr, error.what());

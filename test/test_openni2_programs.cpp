@@ -9,9 +9,11 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <sstream>
+#include <thread>
 
 namespace holdfast { namespace {
 
@@ -237,6 +239,47 @@ TEST(LiveProgram, AnInterruptEndsItWithCompleteFiles)
     EXPECT_TRUE(Json::accept(line));
   EXPECT_EQ(program.wait(), 0);
   EXPECT_GE(countFrames(folder, recording), 1U);
+}
+
+TEST(RecordProgram, SignalsEndItWithCompleteFrames)
+{
+  const std::string folder = freshFolder("record_signals");
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    const std::string frames = folder + "/frames_" + std::to_string(signal);
+    RunningProgram program({"record", "-o", frames});
+    while (!std::filesystem::exists(frames + "/frame_000002.pcd"))
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    program.signal(signal);
+    EXPECT_EQ(program.wait(), 0) << signal;
+    for (const std::string& name : filesIn(frames))
+      EXPECT_EQ(name.size(), std::string("frame_000001.pcd").size()) << name;
+  }
+}
+
+TEST(LiveProgram, WithoutThreadsOrMemoryItEndsWithALine)
+{
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "sanitizers need more memory than that";
+#endif
+  const std::string folder = freshFolder("live_memory");
+  int refused = 0;
+  for (int megabytes = 150; megabytes < 300; megabytes += 8) {
+    const std::string script =
+        "ulimit -c 0; ulimit -v " + std::to_string(1024 * megabytes) +
+        "; exec timeout 60 " + test::shellQuoted(HOLDFAST_PROGRAM) +
+        " live --quiet --no-reconnect --frames 2 --max-patches 20";
+    const auto run = test::runExecutable(folder, "/bin/sh", {"-c", script});
+    SCOPED_TRACE(std::to_string(megabytes) + " MB: " + run.err);
+    if (run.exit_code == 127) // the system cannot load the program
+      continue;
+    ASSERT_TRUE(run.exit_code == 0 || run.exit_code == 1) << run.exit_code;
+    if (run.exit_code == 0)
+      continue;
+    ++refused;
+    EXPECT_EQ(run.err.rfind("holdfast: ", 0), 0U);
+    EXPECT_LE(run.errorLines(), 2); // what failed, and what came of it
+  }
+  std::cout << refused << " runs were refused\n";
 }
 
 TEST(LiveProgram, WhatAKilledProgramRecordedCanBePlayed)

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <condition_variable>
 #include <map>
+#include <new>
 #include <set>
 #include <stdexcept>
 #include <thread>
@@ -274,6 +275,9 @@ Openni2Grabber::Impl::run()
   while (isRunning()) {
     try {
       source_ ? readOnce() : retry();
+    }
+    catch (const std::bad_alloc&) {
+      fail(Kind::DeviceError, info_.device.uri + ": not enough memory");
     }
     catch (const std::exception& error) {
       fail(Kind::DeviceError, error.what());
