@@ -71,9 +71,8 @@ public:
         std::signal(SIGTERM, on_termination);
       AtomicFile file(path);
       file.stream() << "unfinished" << std::flush;
-      const auto told = ::write(ready[1], "x", 1);
-      for (; told == 1;)
-        ::pause();
+      if (::write(ready[1], "x", 1) == 1)
+        ::pause(); // to be ended by a signal
       ::_exit(2);
     }
     char byte = 0;
