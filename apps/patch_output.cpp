@@ -44,7 +44,10 @@ writePatchFiles(const PatchReport& report,
   AtomicFile points(base.string() + ".patches.pcd");
   AtomicFile mesh(base.string() + ".patches.ply");
   writeJson(json.stream(), report, JsonLayout::PatchPerLine);
-  writePatchPoints(points.stream(), report.result.patches, report.sensor_pose);
+  writePatchPoints(points.stream(),
+                   report.result.patches,
+                   report.sensor_pose,
+                   report.offset);
   writeMesh(mesh.stream(), report.result.patches, false, report.offset);
   AtomicFile::commit(std::vector<AtomicFile*>{&points, &mesh, &json});
 }

@@ -502,7 +502,8 @@ writeMesh(std::ostream& out,
 void
 writePatchPoints(std::ostream& out,
                  const std::vector<ExtractedPatch>& patches,
-                 const Pose& sensor_pose)
+                 const Pose& sensor_pose,
+                 const Eigen::Vector3d& offset)
 {
   const pcl::PointCloud<PatchPoint> cloud = toPatchCloud(patches, sensor_pose);
   pcl::PCLPointCloud2 fields;
@@ -516,7 +517,12 @@ writePatchPoints(std::ostream& out,
                                                             cloud.sensor_orientation_);
   if (failed != 0)
     out.setstate(std::ios::failbit);
-  else
+  if (failed == 0 && !offset.isZero(0.0))
+    out << fmt::format("# add {} {} {} m to x y z: single precision cannot hold them\n",
+                       offset.x(),
+                       offset.y(),
+                       offset.z());
+  if (failed == 0)
     out << pcd.str();
 }
 
