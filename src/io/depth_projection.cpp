@@ -243,7 +243,8 @@ cameraOf(const DepthImage& image, const LoadOptions& options, CloudFileInfo& inf
                                  options.camera_name);
   if (camera.width != options.camera.width)
     text += fmt::format(
-        ", scaled from {} to {} pixels of width: a {} image of the same view was "
+        "; intrinsics scaled from {} to {} pixels of width: a {} image of the same "
+        "view was "
         "assumed; "
         "if it was cut out instead, --intrinsics FX,FY,CX,CY says what it is from",
         options.camera.width,
