@@ -124,8 +124,8 @@ private:
 /// Bumpy ground: a height field over a square.
 class Terrain : public Shape {
 public:
-  /// \param size edge length; \param bump_height, \param bump_length amplitude and
-  /// longest wavelength of the bumps.
+  /// \param size edge length.
+  /// \param bump_height, bump_length amplitude and longest wavelength of the bumps.
   Terrain(const Eigen::Vector3d& center,
           double size,
           double bump_height,
