@@ -30,6 +30,9 @@ if(HOLDFAST_SANITIZE)
   add_compile_options(
     -fsanitize=${sanitizers} -fno-sanitize-recover=all -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${sanitizers})
+  # Else Eigen shifts its allocations under AddressSanitizer, and PCL, which is not built
+  # with it, frees ours where they do not begin. The sanitizer's malloc is aligned.
+  add_compile_definitions(EIGEN_MALLOC_ALREADY_ALIGNED=1)
 endif()
 
 # Warnings of one of our own targets.
