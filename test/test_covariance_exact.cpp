@@ -24,7 +24,7 @@ ParameterVector
 refit(const PatchEstimator& estimator, const Sample& sample, PointBatch& batch)
 {
   const Eigen::Vector3d origin = batch.origin();
-  batch.clear(origin);
+  batch.clear(origin, sample.viewpoint);
   for (std::size_t i = 0; i < sample.points.size(); ++i)
     batch.add(sample.points[i], sample.covariances[i]);
   return pack(estimator.estimate(batch).patch);
@@ -68,7 +68,6 @@ fitted(const Sample& sample,
 void
 expectExact(const Sample& sample, FitOptions options)
 {
-  options.viewpoint = sample.viewpoint;
   const FitResult result = fitted(sample, options);
   ASSERT_TRUE(isUsable(result.status)) << statusName(result.status);
   EXPECT_LT(test::normalizedDifference(result.covariance,
@@ -146,7 +145,6 @@ TEST_P(CovarianceExact, GaussNewtonDiffersByTheSizeOfTheResiduals)
     Random random;
     const Sample sample = test::robotSample(GetParam(), noise_scale, random);
     FitOptions options = test::optionsFor(GetParam());
-    options.viewpoint = sample.viewpoint;
     const FitResult exact = fitted(sample, options);
     const FitResult gauss_newton = fitted(sample, options, CovarianceMode::GaussNewton);
     ASSERT_TRUE(isUsable(exact.status)) << statusName(exact.status);

@@ -149,7 +149,6 @@ TEST(Discrimination, TypesAreRecognisedFromNoisyPoints)
                             1.0,
                             random.engine());
       FitOptions options;
-      options.viewpoint = sample.viewpoint;
       PointBatch batch = test::batchOf(sample);
       wrong += PatchFitter(options).fit(batch).bounded.patch.type != type;
     }

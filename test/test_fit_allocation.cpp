@@ -120,7 +120,6 @@ TEST_P(FitAllocation, NoneInSteadyState)
   for (FitOptions options : {FitOptions{}, ray, paper})
     for (const CovarianceMode mode :
          {CovarianceMode::Exact, CovarianceMode::GaussNewton}) {
-      options.viewpoint = samples.front().viewpoint;
       const PatchEstimator estimator(test::optionsFor(GetParam(), options), mode);
       EXPECT_EQ(allocationsInSteadyState(samples, estimator), 0);
     }

@@ -54,7 +54,6 @@ sampleOf(const std::vector<Eigen::Vector3d>& local, const Pose& pose)
 FitResult
 fitted(const test::Sample& sample, FitOptions options)
 {
-  options.viewpoint = sample.viewpoint;
   PointBatch batch = test::batchOf(sample);
   return estimatePatch(batch, options);
 }

@@ -86,7 +86,6 @@ expectSound(const FitResult& result, const Sample& sample)
 FitResult
 fitted(const Sample& sample, FitOptions options)
 {
-  options.viewpoint = sample.viewpoint;
   PointBatch batch = test::batchOf(sample);
   const FitResult result = estimatePatch(batch, options);
   expectSound(result, sample);
@@ -522,8 +521,7 @@ TEST(FitMisuse, OptionsThatMakeNoSenseThrow)
                             [](FitOptions& o) { o.step_tolerance_sigma = 0.0; },
                             [](FitOptions& o) { o.polish_tolerance_sigma = -1.0; },
                             [](FitOptions& o) { o.sigma_floor_m = -1e-6; },
-                            [](FitOptions& o) { o.sigma_floor_m = kNan; },
-                            [](FitOptions& o) { o.viewpoint.z() = kNan; }};
+                            [](FitOptions& o) { o.sigma_floor_m = kNan; }};
   EXPECT_EQ(validityError(FitOptions{}), "");
   EXPECT_EQ(validityError(FitOptions::paper()), "");
   for (std::size_t i = 0; i < std::size(changes); ++i) {
@@ -533,6 +531,14 @@ TEST(FitMisuse, OptionsThatMakeNoSenseThrow)
     EXPECT_THROW(PatchFitter{options}, std::invalid_argument) << i;
     EXPECT_THROW(PatchEstimator{options}, std::invalid_argument) << i;
   }
+}
+
+TEST(FitMisuse, AViewpointThatIsNotFiniteThrows)
+{
+  PointBatch batch;
+  const Eigen::Vector3d nowhere(0.0, kNan, 0.0);
+  EXPECT_THROW(batch.setViewpoint(nowhere), std::invalid_argument);
+  EXPECT_THROW(batch.clear(Eigen::Vector3d::Zero(), nowhere), std::invalid_argument);
 }
 
 }} // namespace holdfast

@@ -24,7 +24,6 @@ class FitInvariance : public testing::TestWithParam<PatchType> {};
 FitResult
 fitted(const Sample& sample, FitOptions options)
 {
-  options.viewpoint = sample.viewpoint;
   // The tolerance of the iterations is not what is tested here.
   options.polish_tolerance_sigma = 1e-9;
   PointBatch batch = test::batchOf(sample);

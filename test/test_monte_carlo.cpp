@@ -27,7 +27,7 @@ flatGrid(int n, double spacing, double sigma)
 {
   const Eigen::Matrix3d S = Eigen::Vector3d(0.0, 0.0, sigma * sigma).asDiagonal();
   PointBatch batch;
-  batch.clear(Eigen::Vector3d::Zero());
+  batch.clear(Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitZ());
   for (int i = 0; i < n; ++i)
     for (int j = 0; j < n; ++j)
       batch.add({spacing * (i - 0.5 * (n - 1)), spacing * (j - 0.5 * (n - 1)), 0.0}, S);
@@ -40,7 +40,6 @@ planeOptions()
   FitOptions options;
   options.surface = SurfaceRequest::Plane;
   options.plane_boundary = BoundaryType::Circle;
-  options.viewpoint = Eigen::Vector3d::UnitZ();
   return options;
 }
 
@@ -89,7 +88,6 @@ TEST_P(MonteCarloOfType, DoesNotDependOnTheNumberOfThreads)
   Random random;
   const test::Sample sample = test::robotSample(GetParam(), 1.0, random);
   FitOptions options = withType(FitOptions{}, GetParam());
-  options.viewpoint = sample.viewpoint;
   PointBatch batch = test::batchOf(sample);
   const Patch reference = fitted(batch, options);
   MonteCarloOptions monte_carlo;
@@ -118,7 +116,6 @@ TEST_P(MonteCarloOfType, AgreesWithTheExactCovarianceForLittleNoise)
   for (Eigen::Matrix3d& covariance : sample.covariances)
     covariance *= 0.01;
   FitOptions options = withType(FitOptions{}, GetParam());
-  options.viewpoint = sample.viewpoint;
   PointBatch batch = test::batchOf(sample);
   const FitResult fit = estimatePatch(batch, options);
   ASSERT_EQ(fit.status, FitStatus::Converged);
@@ -152,7 +149,6 @@ TEST_P(MonteCarloOfType, SpreadIsFreeOfJumpsBetweenRepresentations)
            expMap(Eigen::Vector3d(tilt, 0.0, 0.0));
   sample = test::transformed(sample, turn);
   FitOptions options = withType(FitOptions{}, GetParam());
-  options.viewpoint = sample.viewpoint;
   PointBatch batch = test::batchOf(sample);
   const Patch reference = fitted(batch, options);
   MonteCarloOptions monte_carlo;
@@ -197,7 +193,7 @@ TEST(MonteCarlo, CountsFailures)
   // Three points determine a plane only without noise worth the name; with noise of the
   // size of their distances some fits fail or tilt, but every trial is accounted for.
   PointBatch batch;
-  batch.clear(Eigen::Vector3d::Zero());
+  batch.clear(Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitZ());
   const Eigen::Matrix3d S = 1e-4 * Eigen::Matrix3d::Identity();
   for (const auto& xy : {std::pair(0.0, 0.0), {0.01, 0.0}, {0.0, 0.01}})
     batch.add({xy.first, xy.second, 0.0}, S);

@@ -162,8 +162,6 @@ TEST(ExtractPatches, IsNeighborhoodThenCovariancesThenFit)
 
     const NeighborhoodSampler sampler(cloud, sensor, options.sampler);
     const auto scratch = sampler.makeScratch();
-    FitOptions fit = options.fit;
-    fit.viewpoint = pose.c;
     for (const ExtractedPatch& extracted : result.patches) {
       std::vector<int> indices;
       sampler.neighborhood(*extracted.seed_index, *scratch, indices);
@@ -174,12 +172,14 @@ TEST(ExtractPatches, IsNeighborhoodThenCovariancesThenFit)
       }
       const std::vector<Eigen::Vector3d> at = noisePoints(camera_points, at_surface);
       PointBatch batch;
-      batch.clear(extracted.seed);
+      batch.clear(extracted.seed, pose.c);
       for (std::size_t i = 0; i < points.size(); ++i)
         batch.add(points[i],
                   pose.R * sensor.noise->covariance(at[i]) * pose.R.transpose());
       // The sums of three products in another order, and an ill-conditioned fit.
-      expectSimilar(estimatePatch(batch, fit, options.covariance), extracted.fit, 1e-6);
+      expectSimilar(estimatePatch(batch, options.fit, options.covariance),
+                    extracted.fit,
+                    1e-6);
       EXPECT_EQ(extracted.radius_m, options.sampler.radius_m);
     }
   }

@@ -110,10 +110,9 @@ fitToTruth(const ConsensusCase& c, const ConsensusScene& scene)
 {
   FitOptions options;
   options.surface = c.request;
-  options.viewpoint = scene.cloud->sensor_origin_.head<3>().cast<double>();
   options.debias_scatter = false;
   PointBatch batch;
-  batch.clear(scene.patch.c);
+  batch.clear(scene.patch.c, scene.cloud->sensor_origin_.head<3>().cast<double>());
   for (std::size_t i = 0; i < scene.truth.size(); ++i)
     batch.add(scene.truth[i], scene.truth_covariances[i]);
   return estimatePatch(batch, options);

@@ -267,7 +267,6 @@ Fitted
 fitted(const Sample& sample, FitOptions options)
 {
   Fitted result{test::batchOf(sample), {}, options};
-  result.options.viewpoint = sample.viewpoint;
   result.fit = PatchFitter(result.options).fit(result.batch);
   return result;
 }

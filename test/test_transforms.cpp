@@ -31,7 +31,6 @@ fitTo(const test::Sample& sample, PatchType type, CovarianceMode mode)
 {
   PointBatch batch = test::batchOf(sample);
   FitOptions options = test::optionsFor(type);
-  options.viewpoint = sample.viewpoint;
   return estimatePatch(batch, options, mode);
 }
 

@@ -88,7 +88,6 @@ sweep(PatchType type, const Eigen::Vector2d& kappa)
   truth.kappa = kappa;
   const test::CleanSample clean = test::cleanSample(scene);
   FitOptions options = test::optionsFor(type);
-  options.viewpoint = clean.viewpoint;
   Sweep result;
   std::vector<Observed> values;
   std::vector<ObservedMatrix> covariances;

@@ -40,7 +40,6 @@ fitTo(const Sample& sample, PatchType type)
   Fit fit;
   fit.batch = test::batchOf(sample);
   FitOptions options = test::optionsFor(type);
-  options.viewpoint = sample.viewpoint;
   fit.result = estimatePatch(fit.batch, options);
   return fit;
 }

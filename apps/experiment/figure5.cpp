@@ -53,8 +53,7 @@ measure(const Station& station,
   Scene scene = tableTwoScene(type).scene;
   scene.sensor_pose =
       lookAt(station.position, scene.patches.front().c, Eigen::Vector3d::UnitY());
-  FitOptions options = withType(FitOptions{}, type);
-  options.viewpoint = station.position;
+  const FitOptions options = withType(FitOptions{}, type);
   PointBatch batch = noiseFreeBatch(scene, frustumRays(30, kPi / 3.0), *kinectNoise());
   const FitResult fit = estimatePatch(batch, options);
 

@@ -18,7 +18,7 @@ noiseFreeBatch(const Scene& scene, const RayGrid& rays, const NoiseModel& noise)
   RangeImage image = castRays(scene, rays);
   attachNoise(image, noise);
   PointBatch batch;
-  batch.clear(scene.patches.front().c);
+  batch.clear(scene.patches.front().c, scene.sensor_pose.c);
   for (std::size_t i = 0; i < image.truth.size(); ++i)
     if (image.hits[i] == 0)
       batch.add(image.truth[i], image.covariances[i]);

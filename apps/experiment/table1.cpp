@@ -96,8 +96,7 @@ TypeMetrics
 measure(PatchType type, const ExperimentSettings& settings, const Progress& progress)
 {
   const ReferenceScene scene = tableTwoScene(type);
-  FitOptions options = withType(FitOptions{}, type);
-  options.viewpoint = scene.scene.sensor_pose.c;
+  const FitOptions options = withType(FitOptions{}, type);
   PointBatch batch = noiseFreeBatch(scene.scene, scene.rays, *kinectNoise());
   const PatchFit fit = PatchFitter(options).fit(batch);
   if (fit.status != FitStatus::Converged)

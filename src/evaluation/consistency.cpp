@@ -59,7 +59,7 @@ fillBatch(const std::vector<Eigen::Vector3d>& points,
     computeReferencePoints(camera, Eigen::Vector3d::Zero());
   const auto first = noise_at_surface ? PointBatch::RX : PointBatch::X;
   const Eigen::Matrix3d& R = truth.sensor_pose.R;
-  batch.clear(truth.sensor_pose.toWorld(truth.points.front()));
+  batch.clear(truth.sensor_pose.toWorld(truth.points.front()), truth.sensor_pose.c);
   for (std::size_t i = 0; i < points.size(); ++i) {
     Eigen::Vector3d at;
     for (int k = 0; k < 3; ++k)
@@ -291,8 +291,7 @@ checkConsistency(const Scene& scene,
   const TruePoints truth = truePoints(scene, rays, noise, options.noise_scale);
   if (truth.points.empty())
     throw std::invalid_argument("the sensor does not see the patch");
-  FitOptions fit = withType(options.fit, type);
-  fit.viewpoint = truth.sensor_pose.c;
+  const FitOptions fit = withType(options.fit, type);
 
   const TrialRunner runner(truth, noise, fit, type, options);
   const FitResult reference = runner.noiseFree(CovarianceMode::SecondOrder, fit);

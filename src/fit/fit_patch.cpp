@@ -127,7 +127,7 @@ PatchFitter::fit(PointBatch& batch) const
   // Stage I-1 (i): principal axes.
   fit.scatter = measureScatter(batch,
                                options_.debias_scatter,
-                               options_.viewpoint - batch.origin());
+                               batch.viewpoint() - batch.origin());
   if (!hasExtent(fit.scatter)) {
     fit.status = fit.scatter.covariance.allFinite() ? FitStatus::Degenerate :
                                                       FitStatus::NonFinite;

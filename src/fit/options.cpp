@@ -75,8 +75,6 @@ validityError(const FitOptions& options)
     return "step tolerances must be positive numbers";
   if (!(options.sigma_floor_m >= 0.0))
     return "sigma_floor_m must not be negative";
-  if (!options.viewpoint.allFinite())
-    return "viewpoint must be finite";
   return {};
 }
 

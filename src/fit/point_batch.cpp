@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <new>
+#include <stdexcept>
 
 namespace holdfast {
 namespace {
@@ -31,8 +32,23 @@ PointBatch::Deleter::operator()(double* p) const
 void
 PointBatch::clear(const Eigen::Vector3d& origin)
 {
+  clear(origin, Eigen::Vector3d::Zero());
+}
+
+void
+PointBatch::clear(const Eigen::Vector3d& origin, const Eigen::Vector3d& viewpoint)
+{
   size_ = 0;
   origin_ = origin;
+  setViewpoint(viewpoint);
+}
+
+void
+PointBatch::setViewpoint(const Eigen::Vector3d& viewpoint)
+{
+  if (!viewpoint.allFinite())
+    throw std::invalid_argument("viewpoint must be finite");
+  viewpoint_ = viewpoint;
 }
 
 void

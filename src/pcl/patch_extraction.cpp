@@ -65,11 +65,9 @@ centroid(const RangeCloud& cloud, const std::vector<int>& indices)
 class PatchMaker {
 public:
   PatchMaker(const PointSelection& chosen, const ExtractionOptions& options)
-  : fit_(seenFrom(options.fit, chosen.cloud.sensor_pose.c))
-  , mode_(options.covariance)
-  , side_(options.normal_side)
+  : side_(options.normal_side)
   , gatherer_(chosen.cloud, chosen.sensor.noise, options.fit.noise_at_surface)
-  , estimator_(fit_, mode_)
+  , estimator_(options.fit, options.covariance)
   , validation_(options.validation)
   {
     if (side_ == NormalSide::Outward)
@@ -83,37 +81,30 @@ public:
   {
     ExtractedPatch patch;
     gatherer_.gather(indices, place, batch);
-    patch.fit = estimatorAt(place).estimate(batch);
+    turnNormals(place, batch);
+    patch.fit = estimator_.estimate(batch);
     if (validation_)
       patch.validation = validate(patch.fit, batch, *validation_);
     return patch;
   }
 
 private:
-  static FitOptions seenFrom(FitOptions fit, const Eigen::Vector3d& viewpoint)
-  {
-    fit.viewpoint = viewpoint;
-    return fit;
-  }
-
-  /// The estimator whose normals show to the right side of a place.
-  PatchEstimator estimatorAt(const Eigen::Vector3d& place) const
+  /// Makes the normal at a place show to the side that is wanted.
+  void turnNormals(const Eigen::Vector3d& place, PointBatch& batch) const
   {
     constexpr double kFar = 1e3; // many patches away
     switch (side_) {
     case NormalSide::Viewpoint:
       break;
     case NormalSide::Outward:
-      return PatchEstimator(seenFrom(fit_, place + kFar * (place - middle_)), mode_);
+      batch.setViewpoint(place + kFar * (place - middle_));
+      break;
     case NormalSide::Up:
-      return PatchEstimator(seenFrom(fit_, place + kFar * Eigen::Vector3d::UnitZ()),
-                            mode_);
+      batch.setViewpoint(place + kFar * Eigen::Vector3d::UnitZ());
+      break;
     }
-    return estimator_;
   }
 
-  FitOptions fit_;
-  CovarianceMode mode_;
   NormalSide side_;
   Eigen::Vector3d middle_ = Eigen::Vector3d::Zero();
   PointGatherer gatherer_;

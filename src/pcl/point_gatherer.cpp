@@ -97,7 +97,7 @@ PointGatherer::gather(const std::vector<int>& indices,
                       PointBatch& batch) const
 {
   const int n = static_cast<int>(indices.size());
-  batch.clear(origin);
+  batch.clear(origin, cloud_.sensor_pose.c);
   batch.resize(n);
   if (stored_.empty())
     gatherModelled(indices, batch);

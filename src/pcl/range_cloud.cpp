@@ -13,6 +13,8 @@ validityError(const RangeCloud& cloud)
   if (!cloud.covariances.empty() && cloud.covariances.size() != n)
     return "the cloud has " + std::to_string(cloud.covariances.size()) +
            " covariances for " + std::to_string(n) + " points";
+  if (!cloud.sensor_pose.c.allFinite())
+    return "the sensor's viewpoint must be finite";
   return {};
 }
 

@@ -30,13 +30,10 @@ isotropicNoise(double sigma_m)
 }
 
 FitOptions
-fitOptions(const ConsensusOptions& options,
-           SurfaceRequest surface,
-           const RangeCloud& cloud)
+fitOptions(const ConsensusOptions& options, SurfaceRequest surface)
 {
   FitOptions fit = options.fit;
   fit.surface = surface;
-  fit.viewpoint = cloud.sensor_pose.c;
   return fit;
 }
 
@@ -121,7 +118,7 @@ struct PatchConsensus::Impl {
 void
 PatchConsensus::Impl::prepare()
 {
-  const FitOptions fit = fitOptions(options, surface.request, cloud);
+  const FitOptions fit = fitOptions(options, surface.request);
   estimator.emplace(fit, options.covariance);
   sample_fitter.emplace(sampleOptions(fit));
   distance_gatherer.reset();
@@ -399,7 +396,7 @@ PatchConsensus::solve(const pcl::Indices& sample) const
   for (const int index : sample)
     points.push_back(impl_->position(index));
   const std::optional<Patch> patch =
-      impl_->surface.solve(points, *impl_->sample_fitter);
+      impl_->surface.solve(points, impl_->cloud.sensor_pose.c, *impl_->sample_fitter);
   if (!patch)
     return std::nullopt;
   return coefficientsOf(*patch);

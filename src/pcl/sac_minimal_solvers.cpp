@@ -312,7 +312,9 @@ cylinderThrough(const Sample& sample)
 }
 
 std::optional<Patch>
-paraboloidThrough(const Sample& sample, const PatchFitter& fitter)
+paraboloidThrough(const Sample& sample,
+                  const Eigen::Vector3d& viewpoint,
+                  const PatchFitter& fitter)
 {
   const auto points = normalized(sample);
   if (!points)
@@ -321,7 +323,7 @@ paraboloidThrough(const Sample& sample, const PatchFitter& fitter)
   // fit measures its convergence.
   const double sigma = 1e-3 * points->scale;
   PointBatch batch;
-  batch.clear(points->mean);
+  batch.clear(points->mean, viewpoint);
   for (const Eigen::Vector3d& point : sample)
     batch.add(point, sigma * sigma * Eigen::Matrix3d::Identity());
   const PatchFit fit = fitter.fit(batch);

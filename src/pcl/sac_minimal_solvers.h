@@ -33,7 +33,9 @@ std::optional<Patch> cylinderThrough(const Sample& sample);
 
 /// Six points, as many as a paraboloid whose vertex lies on a given line has
 /// parameters: the fit itself then passes through all of them. A type that the fitter's
-/// options force is imposed afterwards.
-std::optional<Patch> paraboloidThrough(const Sample& sample, const PatchFitter& fitter);
+/// options force is imposed afterwards. The normal points to the viewpoint's side.
+std::optional<Patch> paraboloidThrough(const Sample& sample,
+                                       const Eigen::Vector3d& viewpoint,
+                                       const PatchFitter& fitter);
 
 } // namespace holdfast

@@ -134,7 +134,7 @@ anyParaboloidCoefficients(const Patch& patch)
 
 template <std::optional<Patch> (*solve)(const Sample&)>
 std::optional<Patch>
-withoutFit(const Sample& sample, const PatchFitter&)
+withoutFit(const Sample& sample, const Eigen::Vector3d&, const PatchFitter&)
 {
   return solve(sample);
 }

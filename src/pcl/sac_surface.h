@@ -16,7 +16,9 @@ struct SacSurface {
   kernel::Model model; ///< as the weighted fit sees it
   unsigned int sample_size;
   unsigned int model_size; ///< number of coefficients
-  std::optional<Patch> (*solve)(const Sample& sample, const PatchFitter& fitter);
+  std::optional<Patch> (*solve)(const Sample& sample,
+                                const Eigen::Vector3d& viewpoint,
+                                const PatchFitter& fitter);
   /// \param coefficients model_size finite numbers; nothing if they make no surface.
   std::optional<Patch> (*fromCoefficients)(const Eigen::VectorXd& coefficients);
   Eigen::VectorXd (*toCoefficients)(const Patch& patch);

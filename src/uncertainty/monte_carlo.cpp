@@ -12,7 +12,7 @@ namespace {
 
 // Noise-free points and the noise to draw.
 struct Model {
-  Eigen::Vector3d origin;
+  Eigen::Vector3d origin, viewpoint;
   std::vector<Eigen::Vector3d> points;
   std::vector<Eigen::Matrix3d> covariances;
   std::vector<Eigen::Matrix3d> roots;
@@ -28,6 +28,7 @@ modelOf(const PointBatch& batch)
   valid.removeInvalid();
   Model model;
   model.origin = batch.origin();
+  model.viewpoint = batch.viewpoint();
   for (int i = 0; i < valid.size(); ++i) {
     model.points.push_back(valid.point(i));
     model.covariances.push_back(valid.covariance(i));
@@ -39,7 +40,7 @@ modelOf(const PointBatch& batch)
 void
 drawPoints(const Model& model, std::mt19937_64& generator, PointBatch& batch)
 {
-  batch.clear(model.origin);
+  batch.clear(model.origin, model.viewpoint);
   for (std::size_t i = 0; i < model.points.size(); ++i)
     batch.add(sampleGaussian(model.points[i], model.roots[i], generator),
               model.covariances[i]);

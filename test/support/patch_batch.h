@@ -27,7 +27,8 @@ struct Sample {
 inline void
 fillBatch(const Sample& sample, PointBatch& batch)
 {
-  batch.clear(sample.points.empty() ? Eigen::Vector3d::Zero() : sample.points.front());
+  batch.clear(sample.points.empty() ? Eigen::Vector3d::Zero() : sample.points.front(),
+              sample.viewpoint);
   for (std::size_t i = 0; i < sample.points.size(); ++i)
     batch.add(sample.points[i], sample.covariances[i]);
 }

@@ -41,8 +41,6 @@ struct FitOptions {
   std::optional<BoundaryType> plane_boundary;
   /// Gamma: share of the points, per axis and if Gaussian, that the boundary encloses.
   double containment = 0.95;
-  /// Where the sensor stood, world frame, m: normals point to its side.
-  Eigen::Vector3d viewpoint = Eigen::Vector3d::Zero();
 
   /// Curvatures below this are never told from zero, and closer together than this
   /// never told apart, however sure the data are, 1/m. A floor under the tests of stage

@@ -22,8 +22,21 @@ public:
   static constexpr int kLaneMultiple = 8;
 
   /// Forgets all points; `origin` in world coordinates should be near the points to
-  /// come.
+  /// come. The viewpoint is the world's origin again.
   void clear(const Eigen::Vector3d& origin);
+
+  /// The same, for points seen from a viewpoint.
+  /// \throw std::invalid_argument when it is not finite.
+  void clear(const Eigen::Vector3d& origin, const Eigen::Vector3d& viewpoint);
+
+  /// Where the sensor stood, world frame, m: normals point to its side.
+  /// \throw std::invalid_argument when it is not finite.
+  void setViewpoint(const Eigen::Vector3d& viewpoint);
+
+  const Eigen::Vector3d& viewpoint() const
+  {
+    return viewpoint_;
+  }
 
   /// Makes room for n points without allocating later.
   void reserve(int n);
@@ -84,6 +97,7 @@ private:
   int size_ = 0;
   int capacity_ = 0;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d viewpoint_ = Eigen::Vector3d::Zero();
 };
 
 } // namespace holdfast

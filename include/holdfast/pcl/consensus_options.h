@@ -39,7 +39,7 @@ struct ConsensusOptions {
   /// Of SampleConsensusModelPatch. PatchSegmentation goes by the threshold that was
   /// set: setSigmaThreshold() or setDistanceThreshold().
   ConsensusDistance distance = ConsensusDistance::Mahalanobis;
-  /// fit.surface is that of the model; fit.viewpoint is set from the sensor pose.
+  /// fit.surface is that of the model.
   FitOptions fit;
   CovarianceMode covariance = CovarianceMode::Exact;
 };
