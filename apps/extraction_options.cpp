@@ -191,8 +191,9 @@ finishExtractionOptions(const CLI::App& command, ExtractionSettings& settings)
   if (fit.plane_boundary && fit.surface != SurfaceRequest::Auto &&
       fit.surface != SurfaceRequest::Plane)
     throw CLI::ValidationError("--boundary", "goes with --surface plane or auto only");
-  if (!(fit.containment > 0.0 && fit.containment < 1.0))
-    throw CLI::ValidationError("--containment", "must lie between 0 and 1");
+  if (!(fit.containment >= kSmallestContainment &&
+        fit.containment <= kLargestContainment))
+    throw CLI::ValidationError("--containment", "must lie between 0.001 and 0.999999");
   if (!(fit.curvature_tolerance_per_m >= 0.0))
     throw CLI::ValidationError("--curvature-tolerance", "must not be negative");
   if (const std::string error = validityError(fit); !error.empty())

@@ -60,8 +60,9 @@ validityError(const FitOptions& options)
   if (options.plane_boundary && options.surface != SurfaceRequest::Plane &&
       options.surface != SurfaceRequest::Auto)
     return "a boundary can be chosen for planes only; other surfaces imply theirs";
-  if (!inUnitInterval(options.containment))
-    return "containment must lie between 0 and 1, both excluded";
+  if (!(options.containment >= kSmallestContainment &&
+        options.containment <= kLargestContainment))
+    return "containment must lie between 0.001 and 0.999999";
   if (!inUnitInterval(options.discrimination_level))
     return "discrimination_level must lie between 0 and 1, both excluded";
   if (!(options.curvature_tolerance_per_m >= 0.0))

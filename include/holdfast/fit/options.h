@@ -35,11 +35,19 @@ enum class Residual : std::uint8_t {
   Ray
 };
 
+/// The containment that bounds can mean something for. They are multiples of the
+/// points' own spread: below the first, a patch would be a thousandth of it, less than
+/// the spacing of any cloud; above the second, it would reach beyond 4.9 sigmas, where
+/// a neighbourhood has no point that could bear it out.
+inline constexpr double kSmallestContainment = 1e-3;
+inline constexpr double kLargestContainment = 1.0 - 1e-6;
+
 struct FitOptions {
   SurfaceRequest surface = SurfaceRequest::Auto;
   /// Boundary of planes; other surfaces imply theirs.
   std::optional<BoundaryType> plane_boundary;
-  /// Gamma: share of the points, per axis and if Gaussian, that the boundary encloses.
+  /// Gamma: share of the points, per axis and if Gaussian, that the boundary encloses;
+  /// from kSmallestContainment to kLargestContainment.
   double containment = 0.95;
 
   /// Curvatures below this are never told from zero, and closer together than this

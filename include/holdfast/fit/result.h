@@ -19,8 +19,9 @@ enum class FitStatus : std::uint8_t {
   IterationLimit, ///< max_iterations reached; patch is the best so far
   TooFewPoints, ///< fewer valid points than surface parameters
   Degenerate, ///< normal equations singular (see null_space); no extent; |kappa| of a
-              ///< sphere or cylinder below a tenth of its sigma; or a normal
-              ///< uncertain by more than 1 rad
+              ///< sphere or cylinder below a tenth of its sigma; a normal uncertain by
+              ///< more than 1 rad; or a covariance whose terms cancelled down to
+              ///< rounding: correlations with an eigenvalue below -1e-6
   CurvatureOutOfRange, ///< |kappa| > max_curvature_per_m
   CurvatureSignMismatch, ///< elliptic forced on opposite signs or hyperbolic on equal
   OrientationSingular, ///< |r_xy| = pi: the chart has no finite covariance there
@@ -30,7 +31,8 @@ enum class FitStatus : std::uint8_t {
 /// "converged", "axis_not_observable", ... as in the program's JSON.
 std::string_view statusName(FitStatus status);
 
-/// True for the statuses that come with a patch and a finite covariance.
+/// True for the statuses that come with a patch and a covariance: finite, symmetric,
+/// and positive semi-definite (no eigenvalue of its correlations below -1e-6).
 bool isUsable(FitStatus status);
 
 /// Undetermined directions in the solver's parameters (fit/kernel.h), one unit
