@@ -89,7 +89,7 @@ writeEverything(const std::string& name)
 
   PatchReport report;
   report.cloud = "bowl.pcd";
-  report.sensor = sensor;
+  report.result.sensor = sensor;
   ExtractionOptions options;
   options.sampler.radius_m = 0.1;
   options.threads = 1;

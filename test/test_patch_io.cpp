@@ -42,7 +42,7 @@ someReport()
   test::Random random;
   PatchReport report;
   report.cloud = "folder/a \"cloud\".pcd";
-  report.sensor.name = "kinect_v1";
+  report.result.sensor.name = "kinect_v1";
   report.load_ms = 1.0 / 3.0;
   report.fit_ms = 2.0;
   report.result.rejected = {{FitStatus::TooFewPoints, 3}, {FitStatus::Degenerate, 1}};

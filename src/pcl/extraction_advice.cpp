@@ -15,7 +15,7 @@ constexpr std::size_t kFewestPoints = 3;
 /// Seeds that are tried first: few against all, and enough that a cloud in which one in
 /// ten seeds has neighbours is stopped once in a thousand times only.
 constexpr std::size_t kProbes = 64;
-constexpr std::size_t kWorthProbing = 8 * kProbes;
+constexpr std::size_t kWorthProbing = 4 * kProbes;
 
 /// The unit in which the cloud would be like those of depth cameras: of the size of a
 /// room, with points some millimetres apart; empty when it is so already.

@@ -77,6 +77,17 @@ noteDuplicates(PointSelection& selection)
       " %) lie exactly where others do: each place counts once");
 }
 
+/// Duplicates have a notice of their own.
+void
+noteLeftOut(PointSelection& selection)
+{
+  PointAccounting others = selection.points;
+  others.used += others.duplicate;
+  others.duplicate = 0;
+  if (const std::string text = leftOutText(others); !text.empty())
+    selection.notices.push_back(text);
+}
+
 } // namespace
 
 PointSelection
@@ -107,8 +118,7 @@ selectPoints(const RangeCloud& cloud, const Sensor& nominal)
   selection.cloud = unused.usedCloud();
   selection.points = unused.accounting();
   noteDuplicates(selection);
-  if (const std::string text = leftOutText(selection.points); !text.empty())
-    selection.notices.push_back(text);
+  noteLeftOut(selection);
   return selection;
 }
 
