@@ -855,31 +855,6 @@ crossTermsOfPoints(const Points& points, const State& state, double* out)
   }
 }
 
-// How many points from the first on, in steps of kLanes, are surely valid: coordinates
-// finite and the covariance positive definite, by leading minors. NaN fails every
-// comparison, and what overflows is not below the limit.
-inline int
-leadingValid(const Points& points)
-{
-  const Number zero(0.0), limit(std::numeric_limits<double>::max());
-  int i = 0;
-  for (; i < points.padded_size; i += kLanes) {
-    Number q[3], S[6];
-    loadPoint(points, i, q, S);
-    const Number sum = q[0] + q[1] + q[2];
-    const Number minor = S[0] * S[3] - S[1] * S[1];
-    const Number determinant = S[5] * minor + S[1] * S[2] * S[4] * 2.0 -
-                               (S[0] * S[4] * S[4] + S[3] * S[2] * S[2]);
-    // Padding has no covariance.
-    const Number padding = 1.0 - load(points.channel[9] + i);
-    if (!(allLess(zero, S[0] + padding) && allLess(zero, minor + padding) &&
-          allLess(zero, determinant + padding) && allLess(determinant, limit) &&
-          allLess(sum, limit) && allLess(0.0 - limit, sum)))
-      break;
-  }
-  return i;
-}
-
 inline void
 scatterSums(const Points& points, ScatterSums& out)
 {

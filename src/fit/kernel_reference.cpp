@@ -51,6 +51,7 @@ allLess(double a, double b)
 }
 
 #include "kernel_point.inl"
+#include "kernel_valid.inl"
 
 struct CrossTermAction {
   const Points& points;
