@@ -25,6 +25,7 @@ PatchEstimator::estimate(PointBatch& batch) const
   result.chi2_dof = fit.points - kernel::parameterCount(fit.surface.surface.model);
   result.points = fit.points;
   result.invalid_points = fit.invalid_points;
+  result.uninformative_points = fit.uninformative_points;
   result.iterations = fit.surface.iterations;
   result.polish_steps = fit.surface.polish_steps;
   result.null_space = fit.null_space;

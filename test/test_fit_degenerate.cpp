@@ -62,7 +62,7 @@ isCovariance(const ParameterMatrix& covariance)
 void
 expectSound(const FitResult& result, const Sample& sample)
 {
-  EXPECT_EQ(result.points + result.invalid_points,
+  EXPECT_EQ(result.points + result.invalid_points + result.uninformative_points,
             static_cast<int>(sample.points.size()));
   EXPECT_LE(result.iterations, 2 * FitOptions{}.max_iterations);
   EXPECT_NE(statusName(result.status), "unknown");
@@ -345,6 +345,58 @@ TEST(FitDegenerate, CovariancesOfAnySizeEndSomehow)
       sample.covariances[i] = isotropic(1e-3);
     expectSoundForEveryRequest(sample);
   }
+}
+
+// Points with a sigma of 1 m among others of 1 mm weigh nothing, even where they lie
+// exactly on the surface.
+TEST(FitDegenerate, UninformativePointsWeighNothing)
+{
+  constexpr int kPoints = 100;
+  for (std::uint64_t i = 0; i < 100; ++i)
+    for (const int poor : {1, 2, 10}) {
+      Random random(i);
+      const Pose pose = test::randomPose(random);
+      const bool flat = random.integer(0, 3) == 0;
+      Sample with, without;
+      with.viewpoint = without.viewpoint = pose.toWorld({0.1, 0.2, 1.0});
+      for (int k = 0; k < kPoints; ++k) {
+        const double x = random.uniform(-0.1, 0.1), y = random.uniform(-0.1, 0.1);
+        const Eigen::Vector3d q(x, y, flat ? 0.0 : -2.0 * x * x - 2.5 * y * y);
+        const bool poorly = k % (kPoints / poor) == 0;
+        const double sigma = poorly ? 1.0 : 1e-3;
+        const Eigen::Vector3d noise = (poorly ? 0.0 : sigma) * random.normalVector();
+        with.points.push_back(pose.toWorld(q + noise));
+        with.covariances.push_back(isotropic(sigma));
+        if (poorly)
+          continue;
+        without.points.push_back(with.points.back());
+        without.covariances.push_back(with.covariances.back());
+      }
+      for (const SurfaceRequest request : {SurfaceRequest::Auto,
+                                           SurfaceRequest::Plane,
+                                           SurfaceRequest::CircularCylinder,
+                                           SurfaceRequest::Sphere,
+                                           SurfaceRequest::Paraboloid}) {
+        const FitResult result = fitted(with, requesting(request));
+        const FitResult expected = fitted(without, requesting(request));
+        EXPECT_EQ(result.uninformative_points, poor);
+        EXPECT_EQ(result.points, kPoints - poor);
+        EXPECT_EQ(expected.uninformative_points, 0);
+        ASSERT_EQ(statusName(result.status), statusName(expected.status));
+        ASSERT_EQ(result.patch.type, expected.patch.type);
+        if (!isUsable(result.status))
+          continue;
+        // The batches differ in their origin: rounding.
+        const ParameterVector sigma = expected.covariance.diagonal().cwiseSqrt();
+        EXPECT_LT((pack(result.patch) - pack(expected.patch))
+                      .cwiseQuotient(sigma)
+                      .cwiseAbs()
+                      .maxCoeff(),
+                  1e-5);
+        EXPECT_LT(test::normalizedDifference(result.covariance, expected.covariance),
+                  1e-5);
+      }
+    }
 }
 
 // ---- Scales and places --------------------------------------------------------------

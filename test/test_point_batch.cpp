@@ -4,8 +4,10 @@
 
 #include <holdfast/fit/point_batch.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
+#include <vector>
 
 namespace holdfast { namespace {
 
@@ -152,6 +154,49 @@ TEST(PointBatch, KeepsSingularCovariances)
     batch.add(Eigen::Vector3d::Zero(), S.cast<float>().eval().cast<double>());
   }
   EXPECT_EQ(batch.removeInvalid(), 0);
+}
+
+TEST(PointBatch, DropsWhatCannotInformBesideTheOthers)
+{
+  for (std::uint64_t i = 0; i < 200; ++i) {
+    Random random(i);
+    PointBatch batch;
+    batch.clear(Eigen::Vector3d::Zero());
+    const int typical = random.integer(1, 40);
+    const int poor = random.integer(0, typical - 1); // less than half
+    std::vector<bool> is_poor(static_cast<std::size_t>(typical + poor), false);
+    std::fill_n(is_poor.begin(), poor, true);
+    std::shuffle(is_poor.begin(), is_poor.end(), random.engine());
+    std::vector<double> expected;
+    for (const bool p : is_poor) {
+      // Sigmas within a factor of three of each other, or ten times the largest.
+      const double sigma = p ? random.uniform(30.1, 1e4) : random.uniform(1.0, 3.0);
+      batch.add({static_cast<double>(batch.size()), 0.0, 0.0},
+                sigma * sigma * Eigen::Matrix3d::Identity());
+      if (!p)
+        expected.push_back(batch.size() - 1);
+    }
+    EXPECT_EQ(batch.removeUninformative(), poor);
+    ASSERT_EQ(batch.size(), typical);
+    for (int k = 0; k < typical; ++k)
+      EXPECT_EQ(batch.point(k).x(), expected[static_cast<std::size_t>(k)]);
+  }
+}
+
+TEST(PointBatch, KeepsAllWhereTheNoiseVariesAsOfASensor)
+{
+  for (std::uint64_t i = 0; i < 50; ++i) {
+    Random random(i);
+    PointBatch batch;
+    batch.clear(Eigen::Vector3d::Zero());
+    const int count = random.integer(0, 40);
+    for (int k = 0; k < count; ++k) {
+      const double sigma = random.uniform(1e-3, 9.9e-3);
+      batch.add(Eigen::Vector3d::Zero(), sigma * sigma * Eigen::Matrix3d::Identity());
+    }
+    EXPECT_EQ(batch.removeUninformative(), 0);
+    EXPECT_EQ(batch.size(), count);
+  }
 }
 
 TEST(PointBatch, TheFloorLiftsOnlyWhatIsBelowIt)

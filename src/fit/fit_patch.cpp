@@ -117,11 +117,12 @@ PatchFitter::fit(PointBatch& batch) const
 {
   PatchFit fit;
   fit.invalid_points = batch.removeInvalid();
+  batch.applyFloor(options_.sigma_floor_m);
+  fit.uninformative_points = batch.removeUninformative();
   fit.points = batch.size();
   const Model model = modelOf(options_.surface);
   if (fit.points < kernel::parameterCount(model))
     return fit;
-  batch.applyFloor(options_.sigma_floor_m);
   batch.pad();
 
   // Stage I-1 (i): principal axes.

@@ -21,6 +21,7 @@ struct PatchFit {
   NullSpace null_space = NullSpace(6, 0);
   int points = 0;
   int invalid_points = 0;
+  int uninformative_points = 0;
 
   const UnboundedSurface* normalPlane() const
   {

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <new>
 #include <stdexcept>
+#include <vector>
 
 namespace holdfast {
 namespace {
@@ -107,6 +108,38 @@ isValid(const PointBatch& batch, int i)
          isPositiveSemiDefinite(batch.covariance(i));
 }
 
+double
+traceOf(const PointBatch& batch, int i)
+{
+  return batch.channel(PointBatch::SXX)[i] + batch.channel(PointBatch::SYY)[i] +
+         batch.channel(PointBatch::SZZ)[i];
+}
+
+// True when no trace can be too large beside the median, as none is beside the
+// smallest: nearly always. In lanes, since one running minimum waits for itself.
+bool
+tracesAreAlike(const PointBatch& batch)
+{
+  constexpr int kLanes = PointBatch::kLaneMultiple;
+  if (batch.size() == 0)
+    return true;
+  double smallest[kLanes], largest[kLanes];
+  std::fill_n(smallest, kLanes, traceOf(batch, 0));
+  std::fill_n(largest, kLanes, traceOf(batch, 0));
+  const auto compare = [&](int lane, double trace) {
+    smallest[lane] = trace < smallest[lane] ? trace : smallest[lane];
+    largest[lane] = trace > largest[lane] ? trace : largest[lane];
+  };
+  int i = 0;
+  for (; i + kLanes <= batch.size(); i += kLanes)
+    for (int lane = 0; lane < kLanes; ++lane)
+      compare(lane, traceOf(batch, i + lane));
+  for (; i < batch.size(); ++i)
+    compare(0, traceOf(batch, i));
+  return *std::max_element(largest, largest + kLanes) <=
+         kUninformativeTraceRatio * *std::min_element(smallest, smallest + kLanes);
+}
+
 } // namespace
 
 int
@@ -118,11 +151,40 @@ PointBatch::removeInvalid()
   for (int i = start; i < size_; ++i) {
     if (!isValid(*this, i))
       continue;
-    if (kept != i)
-      for (int c = 0; c < kChannels; ++c)
-        channel(static_cast<Channel>(c))[kept] = channel(static_cast<Channel>(c))[i];
-    ++kept;
+    movePoint(i, kept++);
   }
+  const int removed = size_ - kept;
+  size_ = kept;
+  return removed;
+}
+
+void
+PointBatch::movePoint(int from, int to)
+{
+  if (from != to)
+    for (int c = 0; c < kChannels; ++c)
+      channel(static_cast<Channel>(c))[to] = channel(static_cast<Channel>(c))[from];
+}
+
+int
+PointBatch::removeUninformative()
+{
+  if (tracesAreAlike(*this))
+    return 0;
+  // Kept between neighbourhoods: no allocation once it has seen the largest.
+  thread_local std::vector<double> traces;
+  traces.resize(static_cast<std::size_t>(size_));
+  for (int i = 0; i < size_; ++i)
+    traces[static_cast<std::size_t>(i)] = traceOf(*this, i);
+  // The lower median: at least half of the points stay, and those that go carry less
+  // than a hundredth of the information of those.
+  const auto middle = traces.begin() + (size_ - 1) / 2;
+  std::nth_element(traces.begin(), middle, traces.end());
+  const double largest = kUninformativeTraceRatio * *middle;
+  int kept = 0;
+  for (int i = 0; i < size_; ++i)
+    if (traceOf(*this, i) <= largest)
+      movePoint(i, kept++);
   const int removed = size_ - kept;
   size_ = kept;
   return removed;

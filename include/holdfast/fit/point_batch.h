@@ -9,6 +9,13 @@
 
 namespace holdfast {
 
+/// A point whose covariance has a trace larger than this many times the median of its
+/// neighbourhood, a sigma ten times as large, is left out of the fit. Sensors vary by a
+/// factor of 2 to 4 in sigma over a neighbourhood, so only outliers of another kind are
+/// met; each carries less than 1 % of a typical point's information, but would enter
+/// mean and scatter, which are not weighted, in full.
+inline constexpr double kUninformativeTraceRatio = 100.0;
+
 /// N points with covariances in structure-of-arrays form: ten channels
 /// x y z sxx sxy sxz syy syz szz w in one aligned block, padded to a multiple of
 /// kLaneMultiple with points of weight 0, and three more for the points at which a
@@ -54,6 +61,12 @@ public:
   /// do not get infinite weight.
   void applyFloor(double sigma_floor_m);
 
+  /// Drops points that cannot inform beside the others: trace of the covariance above
+  /// kUninformativeTraceRatio times the (lower) median. Which they are depends on the
+  /// covariances alone, so the estimate stays differentiable in the points.
+  /// \return how many were dropped; less than half.
+  int removeUninformative();
+
   /// Brings the padding after the last point up to date. fitPatch() calls it.
   void pad();
 
@@ -90,6 +103,8 @@ public:
   Eigen::Matrix3d covariance(int i) const;
 
 private:
+  void movePoint(int from, int to);
+
   struct Deleter {
     void operator()(double* p) const;
   };

@@ -55,6 +55,10 @@ struct FitResult {
   int chi2_dof = 0;
   int points = 0; ///< points used
   int invalid_points = 0; ///< points left out: not finite or indefinite covariance
+  /// Points left out because they cannot inform beside the others: the trace of their
+  /// covariance is more than kUninformativeTraceRatio times the median
+  /// (holdfast/fit/point_batch.h).
+  int uninformative_points = 0;
   int iterations = 0; ///< damped Gauss-Newton steps tried
   int polish_steps = 0; ///< exact Newton steps at the end
   /// Directions the data do not determine; no column unless Degenerate, and none where
