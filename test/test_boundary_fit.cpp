@@ -272,16 +272,22 @@ TEST(BoundaryFitStatus, ANormalAlongTheCylindersAxisLeavesNoDirectionForZ)
   EXPECT_EQ(in.bound().status, FitStatus::Degenerate);
 }
 
-TEST(BoundaryFitStatus, ANormalOppositeToTheWorldsZIsSingularForRevoluteTypes)
+TEST(BoundaryFitStatus, ANormalOppositeToTheWorldsZIsKeptOffTheSingularity)
 {
-  Random random;
   for (const PatchType type :
        {PatchType{SurfaceType::CircularParaboloid, BoundaryType::Circle},
-        PatchType{SurfaceType::Plane, BoundaryType::Circle}}) {
-    Input in = randomInput(type, modelOf(type.surface), random);
-    in.surface.R = expMap({3.141592653589793, 0.0, 0.0});
-    EXPECT_EQ(in.bound().status, FitStatus::OrientationSingular);
-  }
+        PatchType{SurfaceType::Plane, BoundaryType::Circle}})
+    for (const double angle : {0.0, 1e-16, 1e-12, 1e-9, 9e-7, 1.1e-6}) {
+      Random random;
+      Input in = randomInput(type, modelOf(type.surface), random);
+      const Eigen::Vector3d axis = random.unitVector();
+      in.surface.R = expMap({3.141592653589793, 0.0, 0.0}) * expMap(angle * axis);
+      const BoundedPatch bounded = in.bound();
+      EXPECT_EQ(bounded.status, FitStatus::Converged) << angle;
+      EXPECT_TRUE(bounded.jacobian.allFinite()) << angle;
+      EXPECT_LT((bounded.patch.normal() - in.surface.R.col(2)).norm(), 2.0 * kRxyMargin)
+          << angle;
+    }
 }
 
 }} // namespace holdfast

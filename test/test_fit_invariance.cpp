@@ -112,6 +112,72 @@ TEST_P(FitInvariance, FitMovesWithTheCloudThroughRotationsNearPi)
   }
 }
 
+// Points of a sphere, a circular paraboloid or a plane that a camera at the origin
+// looks at exactly along their normal, whose r_xy would be the singularity of its
+// chart.
+Sample
+frontalSample(PatchType type, const Eigen::Vector3d& centre, double kappa)
+{
+  Sample sample;
+  constexpr int kHalf = 8;
+  constexpr double kStep = 0.012, kSigma = 1e-3;
+  for (int i = -kHalf; i <= kHalf; ++i)
+    for (int j = -kHalf; j <= kHalf; ++j) {
+      const double x = kStep * i, y = kStep * j, s2 = x * x + y * y;
+      if (s2 > 0.0101)
+        continue;
+      const double z = type.surface == SurfaceType::Plane ?
+                           0.0 :
+                       type.surface == SurfaceType::Sphere ?
+                           kappa * s2 / (1.0 + std::sqrt(1.0 - kappa * kappa * s2)) :
+                           0.5 * kappa * s2;
+      sample.points.emplace_back(centre + Eigen::Vector3d(x, y, -z));
+      sample.covariances.push_back(kSigma * kSigma * Eigen::Matrix3d::Identity());
+    }
+  return sample;
+}
+
+void
+expectSameAsInARotatedFrame(const Sample& sample,
+                            const Pose& T,
+                            const FitOptions& options,
+                            double kappa)
+{
+  const FitResult result = fitted(sample, options);
+  const FitResult moved = fitted(transformed(sample, T), options);
+  ASSERT_TRUE(isUsable(moved.status)) << statusName(moved.status);
+  ASSERT_TRUE(isUsable(result.status)) << statusName(result.status);
+  EXPECT_LT((result.patch.normal() + Eigen::Vector3d::UnitZ()).norm(), 2e-6);
+  EXPECT_NEAR(result.patch.kappa.x(), kappa, 1e-6);
+  EXPECT_TRUE(result.patch.c.isApprox(T.inverse().toWorld(moved.patch.c), 1e-9));
+  const Patch expected = holdfast::transformed(result.patch, T);
+  const ParameterMatrix S = movedTangentCovariance(result, T, expected);
+  EXPECT_LT(test::normalizedDifference(toTangent(moved.patch, moved.covariance), S),
+            1e-3);
+}
+
+TEST_P(FitInvariance, WhatIsSeenExactlyFrontallyIsFittedAsInAnyFrame)
+{
+  const PatchType type = GetParam();
+  if (!isRevolute(type))
+    GTEST_SKIP() << "r of this type has no singularity at a normal of -z";
+  const bool flat = type.surface == SurfaceType::Plane;
+  for (const Eigen::Vector3d& centre : {Eigen::Vector3d(0.0, 0.0, 1.0),
+                                        Eigen::Vector3d(0.0, 0.0, 0.45),
+                                        Eigen::Vector3d(0.3, -0.2, 0.9),
+                                        Eigen::Vector3d(-0.7, 0.6, 1.4)})
+    for (const double kappa : {-5.0, 4.0}) {
+      Random random(static_cast<std::uint64_t>(kappa + 10.0));
+      const Sample sample = frontalSample(type, centre, kappa);
+      const Pose T = test::randomPose(random);
+      for (const FitOptions& options : variants())
+        expectSameAsInARotatedFrame(sample,
+                                    T,
+                                    test::optionsFor(type, options),
+                                    flat ? 0.0 : kappa);
+    }
+}
+
 // A kilometre away coordinates are rounded by 1e-13 m each, 1e-10 of their sigmas of
 // some millimetres; a fit moves by less than the worst of them, and its covariance by
 // the same share, both amplified by at most the condition of the problem, some ten.

@@ -202,6 +202,26 @@ TEST(Rotation, RxyOfOppositeNormalIsAboutX)
     EXPECT_EQ(rxyFromNormal(normal), Eigen::Vector2d(kPi, 0.0));
 }
 
+TEST(Rotation, RegularRxyKeepsOffTheSingularity)
+{
+  for (std::size_t i = 0; i < kAngles.size(); ++i) {
+    Random random(i);
+    const double azimuth = random.uniform(-kPi, kPi);
+    const Eigen::Vector2d r_xy =
+        kAngles[i] * Eigen::Vector2d(std::cos(azimuth), std::sin(azimuth));
+    const Eigen::Vector3d normal = expMap({r_xy.x(), r_xy.y(), 0.0}).col(2);
+    const Eigen::Vector2d found = regularRxyFromNormal(normal);
+    EXPECT_LE(found.norm(), kPi - 0.999 * kRxyMargin);
+    Eigen::Matrix2d J;
+    EXPECT_TRUE(rxyJacobian(found, J));
+    EXPECT_LT((expMap({found.x(), found.y(), 0.0}).col(2) - normal).norm(),
+              2.001 * kRxyMargin);
+    if (kAngles[i] < kPi - kRxyMargin) {
+      EXPECT_EQ(found, rxyFromNormal(normal));
+    }
+  }
+}
+
 TEST(Rotation, RxyJacobianIsTheDerivative)
 {
   for (const double angle : {0.0, 1e-8, 1e-4, 0.05, 0.1, 1.0, 2.0, 3.0}) {

@@ -218,17 +218,16 @@ turnRows(const Eigen::Matrix3d& W, Placement& p)
 }
 
 // The frame of a revolute type, R = Exp([rx ry 0]) with the same z; its twist about z
-// follows from r_z = 0. \return false where the chart is singular.
-bool
-orientRevolute(const Eigen::Vector2d& r_xy, Placement& p, Rows2& dr)
+// follows from r_z = 0. r_xy is off the chart's singularity (regularRxyFromNormal).
+Rows2
+orientRevolute(const Eigen::Vector2d& r_xy, Placement& p)
 {
-  Eigen::Matrix2d J;
-  if (!rxyJacobian(r_xy, J))
-    return false;
-  dr = J * p.delta.topRows<2>();
+  Eigen::Matrix2d J = Eigen::Matrix2d::Identity();
+  rxyJacobian(r_xy, J);
+  const Rows2 dr = J * p.delta.topRows<2>();
   const Eigen::Matrix3d Jr = rightJacobian({r_xy.x(), r_xy.y(), 0.0});
   p.delta.row(2) = Jr.block<1, 2>(2, 0) * dr;
-  return true;
+  return dr;
 }
 
 // The curvature matrix in the axes of the final frame, with its rows.
@@ -416,15 +415,11 @@ boundRevolute(PatchType type,
       sphere ? placeSphere(surface, normal) : placeParaboloid(surface, scatter);
   const Eigen::Vector3d z = sphere ? Eigen::Vector3d(surface.R * normal.n) :
                                      Eigen::Vector3d(surface.R.col(2));
-  const Eigen::Vector2d r_xy = rxyFromNormal(z);
+  const Eigen::Vector2d r_xy = regularRxyFromNormal(z);
   p.R = expMap({r_xy.x(), r_xy.y(), 0.0});
   const Eigen::Matrix3d W = p.R.transpose() * surface.R;
   turnRows(W, p);
-  Rows2 dr;
-  if (!orientRevolute(r_xy, p, dr)) {
-    out.status = FitStatus::OrientationSingular;
-    dr.setZero();
-  }
+  const Rows2 dr = orientRevolute(r_xy, p);
   const MomentFrame f = measureMoments(p, scatter, W);
   Row dk = Row::Zero();
   dk[0] = sphere ? 1.0 : 0.5;
@@ -495,7 +490,7 @@ boundPlaneCircle(PatchType type,
   BoundedPatch out;
   PatchWriter writer(type, out);
   Placement p = placePlaneOf(surface, scatter);
-  const Eigen::Vector2d r_xy = rxyFromNormal(surface.R.col(2));
+  const Eigen::Vector2d r_xy = regularRxyFromNormal(surface.R.col(2));
   // The larger moment is that of the principal axes; the sum is the same in any.
   p.R = principalScatterAxes(surface.R, scatter);
   const Eigen::Matrix3d W = p.R.transpose() * surface.R;
@@ -507,11 +502,7 @@ boundPlaneCircle(PatchType type,
 
   Placement revolute{expMap({r_xy.x(), r_xy.y(), 0.0}), f.c};
   revolute.delta = revolute.R.transpose() * f.R * f.delta;
-  Rows2 dr;
-  if (!orientRevolute(r_xy, revolute, dr)) {
-    out.status = FitStatus::OrientationSingular;
-    dr.setZero();
-  }
+  const Rows2 dr = orientRevolute(r_xy, revolute);
   writer.revolutePose(f, r_xy, dr, origin);
   return out;
 }

@@ -38,8 +38,7 @@ struct ContainmentFactors {
 };
 
 struct BoundedPatch {
-  /// Converged, Degenerate (no extent, or no direction for z), OrientationSingular,
-  /// CurvatureSignMismatch.
+  /// Converged, Degenerate (no extent, or no direction for z), CurvatureSignMismatch.
   FitStatus status = FitStatus::Converged;
   Patch patch;
   PatchJacobian jacobian;

@@ -149,6 +149,15 @@ rxyFromNormal(const Eigen::Vector3d& normal)
   return {-scale * normal.y(), scale * normal.x()};
 }
 
+Eigen::Vector2d
+regularRxyFromNormal(const Eigen::Vector3d& normal)
+{
+  const bool opposite = normal.z() < 0.0;
+  if (opposite && std::hypot(normal.x(), normal.y()) <= kRxyMargin)
+    return {kPi - kRxyMargin, 0.0};
+  return rxyFromNormal(normal);
+}
+
 bool
 rxyJacobian(const Eigen::Vector2d& r_xy, Eigen::Matrix2d& J)
 {

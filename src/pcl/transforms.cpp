@@ -1,6 +1,7 @@
 #include <holdfast/pcl/transforms.h>
 
 #include <holdfast/geometry/gaussian.h>
+#include <holdfast/geometry/rotation.h>
 #include <holdfast/pcl/conversions.h>
 
 #include <Eigen/LU>
@@ -76,16 +77,11 @@ transformed(const FitResult& fit, const Pose& T)
 {
   FitResult moved = fit;
   moved.patch = transformed(fit.patch, T);
+  if (isRevolute(moved.patch.type))
+    moved.patch.r.head<2>() = regularRxyFromNormal(moved.patch.normal());
   if (fit.covariance.size() == 0)
     return moved;
-  Eigen::FullPivLU<ParameterMatrix> chart(tangentJacobian(moved.patch));
-  chart.setThreshold(1e-9); // as rxyJacobian()
-  if (!chart.isInvertible()) {
-    moved.status = FitStatus::OrientationSingular;
-    moved.covariance.resize(0, 0);
-    moved.mean_shift.resize(0);
-    return moved;
-  }
+  const Eigen::FullPivLU<ParameterMatrix> chart(tangentJacobian(moved.patch));
   const ParameterMatrix J = chart.solve(
       representationJacobian(fit.patch, moved.patch, T) * tangentJacobian(fit.patch));
   moved.covariance = propagate(J, fit.covariance);

@@ -16,10 +16,8 @@ revoluteRotation(const Matrix3d& R0, const Vector3d& r)
 {
   const Matrix3d R = R0 * expMap(r);
   Stage<2, 3> out;
-  out.value = rxyFromNormal(R.col(2));
-  // At the chart's singularity the fit reports OrientationSingular and has no
-  // covariance.
-  Eigen::Matrix2d J = Eigen::Matrix2d::Zero();
+  out.value = regularRxyFromNormal(R.col(2));
+  Eigen::Matrix2d J = Eigen::Matrix2d::Identity();
   rxyJacobian(out.value, J);
   const Matrix3d turn = expMap(rotationOf<2>(out.value)).transpose() * R;
   out.J = J * (turn * rightJacobian(r)).topRows<2>();
@@ -61,7 +59,7 @@ principalNormal(const Vector3d& towards, const Vec<6>& entries)
   if (n.dot(towards) < 0.0)
     n = -n;
   Stage<2, 6> out;
-  out.value = rxyFromNormal(n);
+  out.value = regularRxyFromNormal(n);
   Eigen::Matrix2d J = Eigen::Matrix2d::Zero();
   rxyJacobian(out.value, J);
   // The rotation that moves n is about n x dn.

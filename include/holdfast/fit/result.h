@@ -24,7 +24,8 @@ enum class FitStatus : std::uint8_t {
               ///< rounding: correlations with an eigenvalue below -1e-6
   CurvatureOutOfRange, ///< |kappa| > max_curvature_per_m
   CurvatureSignMismatch, ///< elliptic forced on opposite signs or hyperbolic on equal
-  OrientationSingular, ///< |r_xy| = pi: the chart has no finite covariance there
+  OrientationSingular, ///< |r_xy| = pi: no longer produced (r_xy keeps off the chart's
+                       ///< singularity), kept for older files
   NonFinite ///< overflow: coordinates or covariances beyond all reason
 };
 

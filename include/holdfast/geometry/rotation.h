@@ -36,6 +36,18 @@ Eigen::Matrix3d rotatedVectorJacobian(const Eigen::Vector3d& r,
 /// At normal = -z every axis does; [pi 0] is returned.
 Eigen::Vector2d rxyFromNormal(const Eigen::Vector3d& normal);
 
+/// How near to pi regularRxyFromNormal() lets |r_xy| come, radians: a thousandth of the
+/// sigma of any normal a depth camera gives, and far enough that the variances, which
+/// grow with its inverse square, keep their digits.
+inline constexpr double kRxyMargin = 1e-6;
+
+/// rxyFromNormal(), kept off the chart's singularity at -z, where a camera sees what
+/// faces it exactly: for normals within kRxyMargin of -z it is [pi - kRxyMargin, 0],
+/// whose normal is within twice kRxyMargin of theirs. Along a coordinate axis, so that
+/// what the chart cannot tell is one parameter's huge variance and takes no digits from
+/// the other's.
+Eigen::Vector2d regularRxyFromNormal(const Eigen::Vector3d& normal);
+
 /// Derivative of r_xy with respect to (delta_x, delta_y), a perturbation of
 /// R = Exp([r_xy 0]) in its own axes (delta_z follows from r_z = 0 and does not
 /// matter). It is the inverse of the upper left 2x2 block of Jr and diverges as |r_xy|

@@ -21,9 +21,9 @@ Pose toPose(const Eigen::Isometry3d& transform);
 /// The fit in another frame: the patch T * patch in canonical form and the covariance
 /// of its parameters, as the fit to the moved points gives them. (Second-order terms
 /// and the mean shift only nearly so: the map between the two sets of parameters is
-/// taken to first order.) Where the moved patch has |r_xy| = pi, its parameters have no
-/// finite covariance, and the status becomes OrientationSingular. \param T q_new = T.R
-/// q_old + T.c.
+/// taken to first order.) A revolute patch whose moved normal is -z to within a
+/// microradian is turned off it by as much (regularRxyFromNormal), where its parameters
+/// have a finite covariance. \param T q_new = T.R q_old + T.c.
 FitResult transformed(const FitResult& fit, const Pose& T);
 
 /// Every patch, its seed and its covariance; points without a patch stay as they are.
