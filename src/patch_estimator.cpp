@@ -34,7 +34,7 @@ PatchEstimator::estimate(PointBatch& batch) const
         patchCovariance(fit, batch, impl_->fitter, impl_->mode);
     result.covariance = uncertainty.covariance;
     result.mean_shift = uncertainty.mean_shift;
-    result.status = observability(result.patch, result.covariance);
+    result.status = observability(fit, result.covariance);
     if (!isUsable(result.status))
       result.covariance.resize(0, 0);
   }

@@ -578,6 +578,70 @@ TEST(FitDegenerate, UsableMeansACovarianceUnderExtremeOptions)
   EXPECT_GT(usable, kDraws / 20); // the sweep reaches the property
 }
 
+// The points' root mean square distance from their mean, for a cylinder across its
+// axis.
+double
+spreadOf(const Sample& sample, const Patch& patch)
+{
+  const auto count = static_cast<double>(sample.points.size());
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& q : sample.points)
+    mean += q / count;
+  const Eigen::Vector3d axis = patch.type.surface == SurfaceType::Sphere ?
+                                   Eigen::Vector3d::Zero() :
+                                   Eigen::Vector3d(patch.pose().R.col(0));
+  double variance = 0.0;
+  for (const Eigen::Vector3d& q : sample.points)
+    variance += ((q - mean).squaredNorm() - std::pow(axis.dot(q - mean), 2)) / count;
+  return std::sqrt(variance);
+}
+
+// However small the noise that is claimed.
+TEST(FitDegenerate, ACentreOutOfReachIsFlagged)
+{
+  int near = 0, far = 0;
+  for (std::uint64_t i = 0; i < 2000; ++i) {
+    Random random(i);
+    const bool sphere = random.integer(0, 1) == 0;
+    const double size = randomMagnitude(random, -2.0, 1.0);
+    const double radius = size * randomMagnitude(random, 0.5, 4.0);
+    const double sigma = size * randomMagnitude(random, -9.0, -3.0);
+    const Pose pose = test::randomPose(random);
+    Sample sample;
+    for (int k = 0; k < 50; ++k) {
+      const double x = size * random.uniform(-0.5, 0.5);
+      const double y = size * random.uniform(-0.5, 0.5);
+      const double across = sphere ? x * x + y * y : y * y;
+      const double z = -across / (radius + std::sqrt(radius * radius - across));
+      sample.points.push_back(
+          pose.toWorld(Eigen::Vector3d(x, y, z) + sigma * random.normalVector()));
+      sample.covariances.push_back(isotropic(sigma));
+    }
+    sample.viewpoint = pose.toWorld({0.0, 0.0, 10.0 * size});
+    FitOptions options = random.integer(0, 1) == 0 ? FitOptions{} : FitOptions::paper();
+    options.surface =
+        sphere ? SurfaceRequest::Sphere : SurfaceRequest::CircularCylinder;
+    options.sigma_floor_m = 0.0;
+    const FitResult result = fitted(sample, options);
+    if (!isUsable(result.status))
+      continue;
+    const double spreads =
+        1.0 / (std::abs(result.patch.kappa.x()) * spreadOf(sample, result.patch));
+    if (spreads > 51.0) {
+      EXPECT_EQ(result.status, FitStatus::CurvatureNotObservable) << spreads;
+      ++far;
+    }
+    const double distance = (result.patch.c - sample.points.front()).norm() /
+                            spreadOf(sample, result.patch);
+    if (distance > 103.0) {
+      EXPECT_EQ(result.status, FitStatus::CurvatureNotObservable) << distance;
+    }
+    near += spreads < 49.0 && result.status == FitStatus::Converged ? 1 : 0;
+  }
+  EXPECT_GT(far, 100);
+  EXPECT_GT(near, 100);
+}
+
 // ---- Misuse ------------------------------------------------------------------------
 
 TEST(FitMisuse, OptionsThatMakeNoSenseThrow)

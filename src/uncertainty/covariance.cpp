@@ -38,6 +38,12 @@ constexpr double kUnobservableSigmas = 3.0;
 // and cancel, down to rounding.
 constexpr double kNoCurvatureSigmas = 0.1;
 
+// Where the radius is this many times the spread of the points, they rise by less than
+// a hundredth of it over the surface's tangent plane: whatever the noise says, it is
+// what the surface is not that decides, and the centre, which lies on the normal of the
+// scatter, moves with the normal's error times as much.
+constexpr double kLargestRadiusInSpreads = 50.0;
+
 const ThetaMatrix&
 hessianOf(const SurfaceFit& fit, CovarianceMode mode)
 {
@@ -242,11 +248,30 @@ curvatureInSigmas(const Patch& patch, const ParameterMatrix& covariance)
   return std::abs(patch.kappa[0]) / std::sqrt(covariance(k, k));
 }
 
+// True when the centre of a sphere or cylinder is too far away for the points to tell.
+bool
+isCentreBeyondReach(const PatchFit& fit)
+{
+  const Patch& patch = fit.bounded.patch;
+  const bool cylinder = patch.type.surface == SurfaceType::CircularCylinder;
+  if (!cylinder && patch.type.surface != SurfaceType::Sphere)
+    return false;
+  const Eigen::Matrix3d& C = fit.scatter.covariance;
+  double variance = C.trace();
+  if (cylinder) {
+    const Eigen::Vector3d axis = patch.pose().R.col(0);
+    variance -= axis.dot(C * axis);
+  }
+  const double spread = std::sqrt(std::max(variance, 0.0));
+  return std::abs(patch.kappa[0]) * kLargestRadiusInSpreads * spread < 1.0;
+}
+
 } // namespace
 
 FitStatus
-observability(const Patch& patch, const ParameterMatrix& covariance)
+observability(const PatchFit& fit, const ParameterMatrix& covariance)
 {
+  const Patch& patch = fit.bounded.patch;
   if (covariance.size() == 0 || !covariance.allFinite())
     return FitStatus::NonFinite;
   const double curvature = curvatureInSigmas(patch, covariance);
@@ -255,7 +280,7 @@ observability(const Patch& patch, const ParameterMatrix& covariance)
       !(curvature >= kNoCurvatureSigmas) ||
       tiltSigma(patch, covariance) > kUndeterminedTilt)
     return FitStatus::Degenerate;
-  if (curvature < kUnobservableSigmas)
+  if (curvature < kUnobservableSigmas || isCentreBeyondReach(fit))
     return FitStatus::CurvatureNotObservable;
   if (axisSigma(patch, covariance) > kUnobservableAngle)
     return FitStatus::AxisNotObservable;

@@ -30,6 +30,6 @@ PatchCovariance patchCovariance(const PatchFit& fit,
 
 /// What the covariance says of the fit: Converged, or which direction the data do not
 /// determine.
-FitStatus observability(const Patch& patch, const ParameterMatrix& covariance);
+FitStatus observability(const PatchFit& fit, const ParameterMatrix& covariance);
 
 } // namespace holdfast

@@ -15,7 +15,9 @@ enum class FitStatus : std::uint8_t {
                      ///< of a plane) are too close to tell the x axis: its
                      ///< variance is huge or capped
   CurvatureNotObservable, ///< as Converged, but |kappa| of a sphere or cylinder is
-                          ///< below three of its sigmas: the centre slides
+                          ///< below three of its sigmas, or its radius more than 50
+                          ///< times the spread (root mean square; of a cylinder:
+                          ///< across its axis) of the points: the centre slides
   IterationLimit, ///< max_iterations reached; patch is the best so far
   TooFewPoints, ///< fewer valid points than surface parameters
   Degenerate, ///< normal equations singular (see null_space); no extent; |kappa| of a
