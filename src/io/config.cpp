@@ -1,3 +1,4 @@
+#include "one_line.h"
 #include <holdfast/io/atomic_file.h>
 #include <holdfast/io/config.h>
 #include <holdfast/sensor/noise_registry.h>
@@ -141,7 +142,7 @@ private:
 
   std::string fullName(const std::string& name) const
   {
-    return path_.empty() ? name : path_ + "." + name;
+    return io::oneLine(path_.empty() ? name : path_ + "." + name);
   }
 
   const Entry& read(const std::string& name)
@@ -216,7 +217,7 @@ readNoise(Section section, const NoiseParameters& shared)
   const std::string model = section.text("model");
   const NoiseModelKind* kind = findNoiseModelKind(model);
   if (kind == nullptr)
-    section.fail("model", "names no noise model: " + model);
+    section.fail("model", "names no noise model: " + io::oneLine(model));
   NoiseParameters parameters;
   for (const NoiseParameter& parameter : kind->parameters) {
     const std::string& name = parameter.name;

@@ -247,7 +247,7 @@ Enum
 known(const std::optional<Enum>& value, const std::string& name)
 {
   if (!value)
-    throw std::runtime_error("unknown status '" + name + "'");
+    throw std::runtime_error("unknown status " + Json(name).dump());
   return *value;
 }
 
