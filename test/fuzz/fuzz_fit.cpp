@@ -72,7 +72,9 @@ takeOptions(Bytes& bytes)
   FitOptions options = bytes.bit() ? FitOptions::paper() : FitOptions{};
   options.surface = static_cast<SurfaceRequest>(
       bytes.below(static_cast<int>(SurfaceRequest::CircularParaboloid) + 1));
-  if (const int boundary = bytes.below(5); boundary < 4)
+  const bool has_choice = options.surface == SurfaceRequest::Plane ||
+                          options.surface == SurfaceRequest::Auto;
+  if (const int boundary = bytes.below(5); boundary < 4 && has_choice)
     options.plane_boundary = static_cast<BoundaryType>(boundary);
   const auto flags = bytes.take<std::uint8_t>();
   if ((flags & 1U) != 0) {
@@ -246,6 +248,18 @@ requireCovariance(const ParameterMatrix& covariance)
 }
 
 void
+requireRefusal(PointBatch& batch, const FitOptions& options, CovarianceMode mode)
+{
+  try {
+    estimatePatch(batch, options, mode);
+  }
+  catch (const std::invalid_argument&) {
+    return;
+  }
+  require(false, "options that make no sense are refused");
+}
+
+void
 requireUsable(const FitResult& result)
 {
   const Patch& patch = result.patch;
@@ -278,12 +292,14 @@ LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size)
   const CovarianceMode mode = kModes[bytes.take<std::uint8_t>() % kModes.size()];
   const FitOptions options = takeOptions(bytes);
   const std::vector<Point> points = takePoints(bytes);
-  if (!validityError(options).empty())
-    return 0;
   PointBatch batch;
   batch.clear(points.empty() ? Eigen::Vector3d::Zero() : points.back().place);
   for (const Point& point : points)
     batch.add(point.place, point.covariance);
+  if (!validityError(options).empty()) {
+    requireRefusal(batch, options, mode);
+    return 0;
+  }
   const FitResult result = estimatePatch(batch, options, mode);
   require(result.points + result.invalid_points == static_cast<int>(points.size()),
           "every point is used or counted as invalid");
