@@ -399,7 +399,7 @@ loadSensor(const std::string& name_or_path)
   }
   catch (const YAML::Exception& error) {
     throw std::runtime_error(
-        fmt::format("{}:{}: {}", file, lineOf(error.mark), error.msg));
+        fmt::format("{}:{}: {}", file, lineOf(error.mark), io::oneLine(error.msg)));
   }
 }
 
