@@ -32,8 +32,13 @@ void
 makeFrameFolder(const std::string& folder)
 {
   makeFolder(folder);
+  const auto isFrame = [](const std::string& name) {
+    // A writer that was killed may have left a part of one.
+    return name.rfind(kFramePrefix, 0) == 0 &&
+           name.find(".holdfast-partial-") == std::string::npos;
+  };
   for (const auto& entry : std::filesystem::directory_iterator(folder))
-    if (entry.path().filename().string().rfind(kFramePrefix, 0) == 0)
+    if (isFrame(entry.path().filename().string()))
       throw std::runtime_error(folder + ": holds frames already");
 }
 
