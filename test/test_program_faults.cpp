@@ -220,14 +220,16 @@ protected:
                  "\ncd " + shellQuoted(out) + "\n$HOLDFAST " + command);
   }
 
-  /// The least in which it is loaded, MB.
+  /// The least in which it comes to its main(), MB: with less, the loader gives up, or
+  /// a static object of some library ends it before anybody can catch.
   int leastToLoad() const
   {
-    constexpr int kNotLoaded = 127;
+    constexpr int kNotLoaded = 127, kAborted = 134;
     int too_little = 0, enough = 2000;
     while (enough - too_little > 1) {
       const int between = (too_little + enough) / 2;
-      const bool loaded = runWithin(between, "--version").exit_code != kNotLoaded;
+      const int exit_code = runWithin(between, "--version").exit_code;
+      const bool loaded = exit_code != kNotLoaded && exit_code != kAborted;
       (loaded ? enough : too_little) = between;
     }
     return enough;

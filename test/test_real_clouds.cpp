@@ -60,7 +60,8 @@ TEST(RealClouds, SprayCan)
   if (path.empty())
     GTEST_SKIP() << "no recorded clouds: set HOLDFAST_DATA_DIR";
   pcl::PointCloud<pcl::PointXYZ> body;
-  for (const pcl::PointXYZ& p : *loadCloud(path).points)
+  const RangeCloud cloud = loadCloud(path);
+  for (const pcl::PointXYZ& p : *cloud.points)
     if (p.z > -0.043F && p.z < 0.016F && p.x > 0.0F)
       body.push_back(p);
   EXPECT_NEAR(radiusOf(body, "can", "cylinder"), 27.4, 1.5);

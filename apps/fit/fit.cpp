@@ -91,6 +91,23 @@ private:
   std::map<std::string, std::string> written_; ///< cloud by the name of its results
 };
 
+/// \return true when every covariance of the cloud was one.
+bool
+checkCovariances(const PatchReport& report)
+{
+  const PointAccounting& points = report.result.points;
+  if (points.invalid_covariance == 0)
+    return true;
+  const std::string what = report.cloud + ": " +
+                           std::to_string(points.invalid_covariance) + " of " +
+                           std::to_string(points.valid()) +
+                           " covariances are not finite or not positive semi-definite";
+  if (points.used == 0)
+    throw std::runtime_error(what);
+  printError(what + "; those points are left out");
+  return false;
+}
+
 void
 checkPatches(const PatchReport& report)
 {
@@ -171,9 +188,10 @@ fitCloud(const std::string& path,
 
   if (!settings.quiet)
     printNotices(path, notices);
+  const bool clean = checkCovariances(report);
   checkPatches(report);
   output.write(report);
-  return report.result.points.invalid_covariance == 0;
+  return clean;
 }
 
 int

@@ -197,6 +197,7 @@ patchJson(const ExtractedPatch& extracted, const PatchReport& report)
             {"covariance_mode", covarianceModeName(mode)},
             {"status", statusName(fit.status)},
             {"points", fit.points},
+            {"uninformative_points", fit.uninformative_points},
             {"chi2", fit.chi2},
             {"chi2_dof", fit.chi2_dof},
             {"iterations", fit.iterations},
@@ -309,6 +310,7 @@ patchFromJson(const Json& json)
   const std::string status = json.at("status");
   fit.status = known(kStatusNames.find(status), status);
   fit.points = json.at("points");
+  fit.uninformative_points = json.value("uninformative_points", 0); // not in old files
   fit.chi2 = number(json.at("chi2"));
   fit.chi2_dof = json.at("chi2_dof");
   fit.iterations = json.at("iterations");

@@ -327,12 +327,13 @@ extractPatches(const RangeCloud& cloud,
   const CompleteSites sites = completeSites(asked, options, chosen, result.notices);
   SamplingBudget budget(options.sampler, chosen.cloud.points->size(), start);
   std::vector<ExtractedPatch> attempts = attemptAll(sites, maker, options, budget);
+  const bool all_tried = attempts.size() == sites.seeds.size();
   if (!asked.seeds)
     noteLimit(attempts.size(), sites.seeds.size(), result.notices);
   sortOut(std::move(attempts), options.keep_failures, result);
   // A stream has no time to measure an empty frame.
   const bool is_stream = asked.seeds && isLimited(options.sampler);
-  if (sites.promising && !is_stream)
+  if (sites.promising && all_tried && !is_stream)
     adviseOnNoPatches(chosen, options.sampler, result);
   return result;
 }

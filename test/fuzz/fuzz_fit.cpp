@@ -301,8 +301,9 @@ LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size)
     return 0;
   }
   const FitResult result = estimatePatch(batch, options, mode);
-  require(result.points + result.invalid_points == static_cast<int>(points.size()),
-          "every point is used or counted as invalid");
+  require(result.points + result.invalid_points + result.uninformative_points ==
+              static_cast<int>(points.size()),
+          "every point is used or counted as left out");
   if (isUsable(result.status))
     requireUsable(result);
   else
