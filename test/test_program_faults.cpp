@@ -270,7 +270,9 @@ TEST_F(LittleMemory, FitOnManyThreads)
 
 TEST_F(LittleMemory, Info)
 {
-  expectOneLineOrSuccess("info ../bowl.pcd --quiet --json bowl.json", {"bowl.json"});
+  // Large enough to want memory of its own.
+  saveCloud(folder_ + "/large.pcd", test::bowlCloud(1200, 900));
+  expectOneLineOrSuccess("info ../large.pcd --quiet --json bowl.json", {"bowl.json"});
 }
 
 TEST_F(LittleMemory, Render)
