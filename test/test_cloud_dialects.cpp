@@ -458,11 +458,15 @@ TEST_F(CloudDialects, LargeCoordinatesAreShiftedBeforeTheyBecomeFloat)
                   (*loaded.cloud.points)[i].getVector3fMap());
     }
   }
-  // Single precision has lost its digits already; nothing to shift for.
+}
+
+TEST_F(CloudDialects, SinglePrecisionHasLostItsDigitsAlready)
+{
   std::string singles;
-  for (const Eigen::Vector3d& q : points)
-    for (int k = 0; k < 3; ++k)
-      singles += rawBytes(static_cast<float>(q[k]));
+  for (int i = 0; i < 50; ++i)
+    for (const double x : {451234.25 + 0.01 * i, 5412345.5 - 0.02 * i, 310.125})
+      singles += rawBytes(static_cast<float>(x));
+  const std::string size = "WIDTH 50\nVIEWPOINT 451234 5412345 312 1 0 0 0\n";
   const Loaded coarse =
       load("VERSION 0.7\nFIELDS x y z\n" + size + "DATA binary\n" + singles);
   EXPECT_TRUE(coarse.cloud.offset.isZero());

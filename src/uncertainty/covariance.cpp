@@ -204,8 +204,8 @@ axisSigma(const Patch& patch, const ParameterMatrix& covariance)
 }
 
 // True when the correlations have no eigenvalue below -1e-6, by the Cholesky pivots of
-// correlations + 1e-6 I. Written out, since it is asked of every patch: 0.2 us, where
-// Eigen's eigenvalues take 10. A parameter without variance must have no covariance.
+// correlations + 1e-6 I. Written out, since it is asked of every patch. A parameter
+// without variance must have no covariance.
 bool
 isPositiveSemiDefiniteByPivots(const ParameterMatrix& S)
 {
