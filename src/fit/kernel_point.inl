@@ -11,8 +11,7 @@
 //   selectLess(a, b, x, y)    a < b ? x : y, lane by lane
 //   allLess(a, b)             a < b in every lane
 //   HOLDFAST_INLINE           before functions of the hot loop
-//   HOLDFAST_UNROLL           before loops of constant length, whose arrays then live
-//   in
+//   HOLDFAST_UNROLLED_FOR     `for` of constant length, whose arrays then live in
 //                             registers
 //
 // The notation is that of fit/kernel.h.
@@ -36,11 +35,9 @@ multiply(const Number S[6], const Number v[3], Number out[3])
 HOLDFAST_INLINE void
 loadPoint(const Points& points, int i, Number q[3], Number S[6])
 {
-  HOLDFAST_UNROLL
-  for (int k = 0; k < 3; ++k)
+  HOLDFAST_UNROLLED_FOR (int k = 0; k < 3; ++k)
     q[k] = load(points.channel[k] + i);
-  HOLDFAST_UNROLL
-  for (int k = 0; k < 6; ++k)
+  HOLDFAST_UNROLLED_FOR (int k = 0; k < 6; ++k)
     S[k] = load(points.channel[3 + k] + i);
 }
 
@@ -48,8 +45,7 @@ loadPoint(const Points& points, int i, Number q[3], Number S[6])
 HOLDFAST_INLINE void
 rotateIntoFrame(const double R[9], const Number v[3], Number out[3])
 {
-  HOLDFAST_UNROLL
-  for (int i = 0; i < 3; ++i)
+  HOLDFAST_UNROLLED_FOR (int i = 0; i < 3; ++i)
     out[i] = v[0] * R[i] + v[1] * R[3 + i] + v[2] * R[6 + i];
 }
 
@@ -58,16 +54,14 @@ HOLDFAST_INLINE void
 rotateCovarianceIntoFrame(const double R[9], const Number S[6], Number out[6])
 {
   Number SR[3][3]; // row i: (S R)(:, i)
-  HOLDFAST_UNROLL
-  for (int i = 0; i < 3; ++i) {
+  HOLDFAST_UNROLLED_FOR (int i = 0; i < 3; ++i) {
     SR[i][0] = S[0] * R[i] + S[1] * R[3 + i] + S[2] * R[6 + i];
     SR[i][1] = S[1] * R[i] + S[3] * R[3 + i] + S[4] * R[6 + i];
     SR[i][2] = S[2] * R[i] + S[4] * R[3 + i] + S[5] * R[6 + i];
   }
   const int row[6] = {0, 0, 0, 1, 1, 2};
   const int column[6] = {0, 1, 2, 1, 2, 2};
-  HOLDFAST_UNROLL
-  for (int e = 0; e < 6; ++e)
+  HOLDFAST_UNROLLED_FOR (int e = 0; e < 6; ++e)
     out[e] = SR[column[e]][0] * R[row[e]] + SR[column[e]][1] * R[3 + row[e]] +
              SR[column[e]][2] * R[6 + row[e]];
 }
@@ -76,8 +70,7 @@ rotateCovarianceIntoFrame(const double R[9], const Number S[6], Number out[6])
 HOLDFAST_INLINE void
 rotateOutOfFrame(const double R[9], const Number v[3], Number out[3])
 {
-  HOLDFAST_UNROLL
-  for (int i = 0; i < 3; ++i)
+  HOLDFAST_UNROLLED_FOR (int i = 0; i < 3; ++i)
     out[i] = v[0] * R[3 * i] + v[1] * R[3 * i + 1] + v[2] * R[3 * i + 2];
 }
 
@@ -183,8 +176,7 @@ struct SphereSurface {
 
   HOLDFAST_INLINE void applyG(const Number v[3], Number out[3]) const
   {
-    HOLDFAST_UNROLL
-    for (int i = 0; i < 3; ++i)
+    HOLDFAST_UNROLLED_FOR (int i = 0; i < 3; ++i)
       out[i] = v[i] * (2.0 * s.k[0]);
   }
 
@@ -332,8 +324,7 @@ struct BatchNoise {
   HOLDFAST_INLINE void enter(const double frame[9], const Number batch[6])
   {
     R = frame;
-    HOLDFAST_UNROLL
-    for (int e = 0; e < 6; ++e)
+    HOLDFAST_UNROLLED_FOR (int e = 0; e < 6; ++e)
       S[e] = batch[e];
   }
 
@@ -377,8 +368,7 @@ enterFrame(const Surface& surface, const Points& points, int i, Local<Noise>& p)
   const State& state = surface.s;
   Number offset[3], S[6];
   loadPoint(points, i, offset, S);
-  HOLDFAST_UNROLL
-  for (int k = 0; k < 3; ++k)
+  HOLDFAST_UNROLLED_FOR (int k = 0; k < 3; ++k)
     offset[k] = offset[k] - state.c[k];
   p.weight = load(points.channel[9] + i);
   rotateIntoFrame(state.R, offset, p.q);
@@ -402,8 +392,7 @@ template <typename Noise>
 HOLDFAST_INLINE void
 slopeInG(const Local<Noise>& p, Number V, Number w, Number mu[3])
 {
-  HOLDFAST_UNROLL
-  for (int i = 0; i < 3; ++i)
+  HOLDFAST_UNROLLED_FOR (int i = 0; i < 3; ++i)
     mu[i] = p.t[i] * (V * 2.0) + p.r[i] * w;
 }
 
@@ -421,17 +410,14 @@ struct SurfaceDerivatives {
     surface.combine(p, f);
     quadraticMonomials(t, p);
     surface.combine(p, tGt);
-    HOLDFAST_UNROLL
-    for (int k = 0; k < 3; ++k) {
+    HOLDFAST_UNROLLED_FOR (int k = 0; k < 3; ++k) {
       gradientComponent(k, q, p);
       surface.combine(p, column);
-      HOLDFAST_UNROLL
-      for (int a = 0; a < kCount; ++a)
+      HOLDFAST_UNROLLED_FOR (int a = 0; a < kCount; ++a)
         B[a][k] = column[a];
       hessianRow(k, t, p);
       surface.combine(p, column);
-      HOLDFAST_UNROLL
-      for (int a = 0; a < kCount; ++a)
+      HOLDFAST_UNROLLED_FOR (int a = 0; a < kCount; ++a)
         Gt[a][k] = column[a];
     }
   }
@@ -485,21 +471,18 @@ differentiateAlong(const Surface& surface,
     E_Va = E_Va + E.Vw * w_a;
   }
   const Number twice_E_Va = E_Va * 2.0;
-  HOLDFAST_UNROLL
-  for (int i = 0; i < 3; ++i)
+  HOLDFAST_UNROLLED_FOR (int i = 0; i < 3; ++i)
     change[i] = p.g[i] * twice_E_Va + B[i] * p.twice_E_V;
   if (ResidualPolicy::kUsesCurvature) {
     Number G_t_a[3];
     multiply(p.noise.S, B, along.t);
     surface.applyG(along.t, G_t_a);
-    HOLDFAST_UNROLL
-    for (int i = 0; i < 3; ++i)
+    HOLDFAST_UNROLLED_FOR (int i = 0; i < 3; ++i)
       change[i] = change[i] + p.Gt[i] * along.E_w + (G_t_a[i] + d.Gt[a][i]) * p.E_w;
   }
   multiply(p.noise.S, change, along.mu);
   surface.applyG(along.mu, G_mu_a);
-  HOLDFAST_UNROLL
-  for (int k = 0; k < 3; ++k) {
+  HOLDFAST_UNROLLED_FOR (int k = 0; k < 3; ++k) {
     Number row[kPolynomials], G_a_mu[d.kCount];
     hessianRow(k, p.mu, row);
     surface.combine(row, G_a_mu);
@@ -522,8 +505,7 @@ template <int n>
 HOLDFAST_INLINE void
 copy(const Number (&from)[n], Number (&to)[n])
 {
-  HOLDFAST_UNROLL
-  for (int i = 0; i < n; ++i)
+  HOLDFAST_UNROLLED_FOR (int i = 0; i < n; ++i)
     to[i] = from[i];
 }
 
@@ -590,8 +572,7 @@ addGradient(const Surface& surface,
     Number change[kPolynomials];
     changeAlong(slot->q, slot->t, slot->f, slot->mu, slot->w, change);
     cost = cost + scale * slot->e * 0.5;
-    HOLDFAST_UNROLL
-    for (int k = 0; k < kPolynomials; ++k)
+    HOLDFAST_UNROLLED_FOR (int k = 0; k < kPolynomials; ++k)
       L[k] = L[k] + scale * change[k];
     surface.combine(change, slot->J);
   }
@@ -606,11 +587,9 @@ addJtJ(const NormalSlot<p>* tile, int size, NormalAccumulators<p>& sums)
   Number JtJ[p * (p + 1) / 2];
   copy(sums.JtJ, JtJ);
   for (const NormalSlot<p>* slot = tile; slot != tile + size; ++slot) {
-    HOLDFAST_UNROLL
-    for (int a = 0; a < p; ++a) {
+    HOLDFAST_UNROLLED_FOR (int a = 0; a < p; ++a) {
       const Number J_over_V = slot->J[a] * slot->inverse;
-      HOLDFAST_UNROLL
-      for (int b = a; b < p; ++b)
+      HOLDFAST_UNROLLED_FOR (int b = a; b < p; ++b)
         JtJ[packed(a, b, p)] = JtJ[packed(a, b, p)] + J_over_V * slot->J[b];
     }
   }
@@ -686,8 +665,7 @@ addHessianRow(const Surface& surface,
 {
   constexpr int columns = a < shape ? a + 1 : 0;
   Number H[columns + 1];
-  HOLDFAST_UNROLL
-  for (int b = 0; b < columns; ++b)
+  HOLDFAST_UNROLLED_FOR (int b = 0; b < columns; ++b)
     H[b] = sums.H[packed(b, a, shape)];
   for (int i = 0; i < tile.size; ++i) {
     const Expansion& point = tile.point[i];
@@ -695,15 +673,13 @@ addHessianRow(const Surface& surface,
     Along along;
     differentiateAlong<a, ResidualPolicy>(surface, point, d, along);
     copy(along.X, tile.X[i][a]);
-    HOLDFAST_UNROLL
-    for (int b = 0; b < columns; ++b) {
+    HOLDFAST_UNROLLED_FOR (int b = 0; b < columns; ++b) {
       H[b] = H[b] + along.E_f * d.f[b] + dot(d.B[b], along.mu);
       if (ResidualPolicy::kUsesCurvature)
         H[b] = H[b] + along.E_w * d.tGt[b] + dot(d.Gt[b], along.t) * point.E_w;
     }
   }
-  HOLDFAST_UNROLL
-  for (int b = 0; b < columns; ++b)
+  HOLDFAST_UNROLLED_FOR (int b = 0; b < columns; ++b)
     sums.H[packed(b, a, shape)] = H[b];
 }
 
@@ -715,31 +691,26 @@ addCrossRow(const Tile<p>& tile, CovarianceAccumulators<p, shape>& sums)
   constexpr int first = packed(a, a, p);
   Number X[3], XS[3], XSq[6], XX[p - a];
   copy(sums.X[a], X), copy(sums.XS[a], XS), copy(sums.XSq[a], XSq);
-  HOLDFAST_UNROLL
-  for (int b = a; b < p; ++b)
+  HOLDFAST_UNROLLED_FOR (int b = a; b < p; ++b)
     XX[b - a] = sums.XX[first + b - a];
   for (int i = 0; i < tile.size; ++i) {
     const Number* qt = tile.qt[i];
     Number noisy[3];
     multiply(tile.point[i].noise.S, tile.X[i][a], noisy);
-    HOLDFAST_UNROLL
-    for (int k = 0, pair = 0; k < 3; ++k) {
+    HOLDFAST_UNROLLED_FOR (int k = 0, pair = 0; k < 3; ++k) {
       X[k] = X[k] + tile.X[i][a][k];
       XS[k] = XS[k] + noisy[k];
-      HOLDFAST_UNROLL
-      for (int j = k; j < 3; ++j, ++pair) {
+      HOLDFAST_UNROLLED_FOR (int j = k; j < 3; ++j, ++pair) {
         XSq[pair] = XSq[pair] + noisy[k] * qt[j];
         if (j != k)
           XSq[pair] = XSq[pair] + noisy[j] * qt[k];
       }
     }
-    HOLDFAST_UNROLL
-    for (int b = a; b < p; ++b)
+    HOLDFAST_UNROLLED_FOR (int b = a; b < p; ++b)
       XX[b - a] = XX[b - a] + dot(noisy, tile.X[i][b]);
   }
   copy(X, sums.X[a]), copy(XS, sums.XS[a]), copy(XSq, sums.XSq[a]);
-  HOLDFAST_UNROLL
-  for (int b = a; b < p; ++b)
+  HOLDFAST_UNROLLED_FOR (int b = a; b < p; ++b)
     sums.XX[first + b - a] = XX[b - a];
 }
 
@@ -750,29 +721,23 @@ HOLDFAST_INLINE void
 addMoments(int e, const Tile<p>& tile, CovarianceAccumulators<p, shape>& sums)
 {
   Number S = sums.S[e], qS[3], qqS[6];
-  HOLDFAST_UNROLL
-  for (int k = 0; k < 3; ++k)
+  HOLDFAST_UNROLLED_FOR (int k = 0; k < 3; ++k)
     qS[k] = sums.qS[k][e];
-  HOLDFAST_UNROLL
-  for (int pair = 0; pair < 6; ++pair)
+  HOLDFAST_UNROLLED_FOR (int pair = 0; pair < 6; ++pair)
     qqS[pair] = sums.qqS[pair][e];
   for (int i = 0; i < tile.size; ++i) {
     S = S + tile.point[i].noise.S[e];
-    HOLDFAST_UNROLL
-    for (int a = 0, pair = 0; a < 3; ++a) {
+    HOLDFAST_UNROLLED_FOR (int a = 0, pair = 0; a < 3; ++a) {
       const Number product = tile.qt[i][a] * tile.point[i].noise.S[e];
       qS[a] = qS[a] + product;
-      HOLDFAST_UNROLL
-      for (int b = a; b < 3; ++b, ++pair)
+      HOLDFAST_UNROLLED_FOR (int b = a; b < 3; ++b, ++pair)
         qqS[pair] = qqS[pair] + product * tile.qt[i][b];
     }
   }
   sums.S[e] = S;
-  HOLDFAST_UNROLL
-  for (int k = 0; k < 3; ++k)
+  HOLDFAST_UNROLLED_FOR (int k = 0; k < 3; ++k)
     sums.qS[k][e] = qS[k];
-  HOLDFAST_UNROLL
-  for (int pair = 0; pair < 6; ++pair)
+  HOLDFAST_UNROLLED_FOR (int pair = 0; pair < 6; ++pair)
     sums.qqS[pair][e] = qqS[pair];
 }
 
@@ -809,11 +774,9 @@ covarianceSums(const Points& points, const State& state, CovarianceSums& out)
       sums.cost = sums.cost + point.E;
       Number L[kPolynomials];
       changeAlong(point.q, point.t, point.E_f, point.mu, point.E_w, L);
-      HOLDFAST_UNROLL
-      for (int k = 0; k < kPolynomials; ++k)
+      HOLDFAST_UNROLLED_FOR (int k = 0; k < kPolynomials; ++k)
         sums.L[k] = sums.L[k] + L[k];
-      HOLDFAST_UNROLL
-      for (int k = 0; k < 3; ++k)
+      HOLDFAST_UNROLLED_FOR (int k = 0; k < 3; ++k)
         tile.qt[i][k] = point.q[k] - state.centroid[k];
     }
     addTile<ResidualPolicy>(surface, tile, sums, std::make_integer_sequence<int, p>());
@@ -861,31 +824,24 @@ scatterSums(const Points& points, ScatterSums& out)
   Number q[3], qq[6], sigma[6];
   for (Number& sum : q)
     sum = Number(0.0);
-  HOLDFAST_UNROLL
-  for (int e = 0; e < 6; ++e)
+  HOLDFAST_UNROLLED_FOR (int e = 0; e < 6; ++e)
     qq[e] = sigma[e] = Number(0.0);
   for (int i = 0; i < points.padded_size; i += kLanes) {
     const Number weight = load(points.channel[9] + i);
     Number v[3];
-    HOLDFAST_UNROLL
-    for (int k = 0; k < 3; ++k) {
+    HOLDFAST_UNROLLED_FOR (int k = 0; k < 3; ++k) {
       v[k] = load(points.channel[k] + i) * weight;
       q[k] = q[k] + v[k];
     }
-    HOLDFAST_UNROLL
-    for (int a = 0, pair = 0; a < 3; ++a)
-      HOLDFAST_UNROLL
-    for (int b = a; b < 3; ++b, ++pair)
-      qq[pair] = qq[pair] + v[a] * v[b];
-    HOLDFAST_UNROLL
-    for (int e = 0; e < 6; ++e)
+    HOLDFAST_UNROLLED_FOR (int a = 0, pair = 0; a < 3; ++a)
+      HOLDFAST_UNROLLED_FOR (int b = a; b < 3; ++b, ++pair)
+        qq[pair] = qq[pair] + v[a] * v[b];
+    HOLDFAST_UNROLLED_FOR (int e = 0; e < 6; ++e)
       sigma[e] = sigma[e] + load(points.channel[3 + e] + i);
   }
-  HOLDFAST_UNROLL
-  for (int k = 0; k < 3; ++k)
+  HOLDFAST_UNROLLED_FOR (int k = 0; k < 3; ++k)
     out.q[k] = sumOfLanes(q[k]);
-  HOLDFAST_UNROLL
-  for (int e = 0; e < 6; ++e) {
+  HOLDFAST_UNROLLED_FOR (int e = 0; e < 6; ++e) {
     out.qq[e] = sumOfLanes(qq[e]);
     out.sigma[e] = sumOfLanes(sigma[e]);
   }
@@ -904,34 +860,27 @@ quadricSums(const Points& points,
     sum = Number(0.0);
   for (int i = 0; i < points.padded_size; i += kLanes) {
     Number offset[3], q[3];
-    HOLDFAST_UNROLL
-    for (int k = 0; k < 3; ++k)
+    HOLDFAST_UNROLLED_FOR (int k = 0; k < 3; ++k)
       offset[k] = load(points.channel[k] + i) - c[k];
     const Number weight = load(points.channel[9] + i);
     rotateIntoFrame(R, offset, q);
     Number term[15];
     term[0] = weight;
-    HOLDFAST_UNROLL
-    for (int degree = 1, at = 1; degree <= 4; ++degree) {
+    HOLDFAST_UNROLLED_FOR (int degree = 1, at = 1; degree <= 4; ++degree) {
       const int previous = at - degree;
-      HOLDFAST_UNROLL
-      for (int k = 0; k < degree; ++k)
+      HOLDFAST_UNROLLED_FOR (int k = 0; k < degree; ++k)
         term[at + k] = term[previous + k] * q[0];
       term[at + degree] = term[at - 1] * q[1];
       at += degree + 1;
     }
-    HOLDFAST_UNROLL
-    for (int e = 0; e < 15; ++e)
+    HOLDFAST_UNROLLED_FOR (int e = 0; e < 15; ++e)
       monomial[e] = monomial[e] + term[e];
-    HOLDFAST_UNROLL
-    for (int e = 0; e < 6; ++e)
+    HOLDFAST_UNROLLED_FOR (int e = 0; e < 6; ++e)
       height[e] = height[e] + term[e] * q[2];
   }
-  HOLDFAST_UNROLL
-  for (int e = 0; e < 15; ++e)
+  HOLDFAST_UNROLLED_FOR (int e = 0; e < 15; ++e)
     out.monomial[e] = sumOfLanes(monomial[e]);
-  HOLDFAST_UNROLL
-  for (int e = 0; e < 6; ++e)
+  HOLDFAST_UNROLLED_FOR (int e = 0; e < 6; ++e)
     out.z[e] = sumOfLanes(height[e]);
 }
 
@@ -944,22 +893,18 @@ moveOnto(const Points& points,
          double* const out[3])
 {
   Number origin[3], camera[3];
-  HOLDFAST_UNROLL
-  for (int k = 0; k < 3; ++k)
+  HOLDFAST_UNROLLED_FOR (int k = 0; k < 3; ++k)
     origin[k] = Number(viewpoint[k] - c[k]);
   rotateIntoFrame(R, origin, camera);
   for (int i = 0; i < points.padded_size; i += kLanes) {
     Number offset[3], q[3], ray[3];
-    HOLDFAST_UNROLL
-    for (int k = 0; k < 3; ++k)
+    HOLDFAST_UNROLLED_FOR (int k = 0; k < 3; ++k)
       offset[k] = load(points.channel[k] + i) - c[k];
     rotateIntoFrame(R, offset, q);
-    HOLDFAST_UNROLL
-    for (int k = 0; k < 3; ++k)
+    HOLDFAST_UNROLLED_FOR (int k = 0; k < 3; ++k)
       ray[k] = q[k] - camera[k];
     Number move(0.0); // t - 1
-    HOLDFAST_UNROLL
-    for (int step = 0; step < 2; ++step) {
+    HOLDFAST_UNROLLED_FOR (int step = 0; step < 2; ++step) {
       const Number x = q[0] + move * ray[0], y = q[1] + move * ray[1];
       const Number hx = x * h[3] + y * h[4], hy = x * h[4] + y * h[5];
       const Number height = x * (hx * 0.5 + h[1]) + y * (hy * 0.5 + h[2]) + h[0];
@@ -969,8 +914,7 @@ moveOnto(const Points& points,
     const Number limit(0.1);
     move = selectLess(move, limit, move, Number(0.0));
     move = selectLess(0.0 - limit, move, move, Number(0.0));
-    HOLDFAST_UNROLL
-    for (int k = 0; k < 3; ++k)
+    HOLDFAST_UNROLLED_FOR (int k = 0; k < 3; ++k)
       store(load(points.channel[k] + i) * (move + 1.0) - move * viewpoint[k],
             out[k] + i);
   }

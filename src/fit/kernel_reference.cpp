@@ -6,7 +6,7 @@
 #include <utility>
 
 #define HOLDFAST_INLINE inline
-#define HOLDFAST_UNROLL
+#define HOLDFAST_UNROLLED_FOR(...) for (__VA_ARGS__)
 
 namespace holdfast { namespace kernel {
 namespace {

@@ -19,7 +19,7 @@
 #include <hwy/highway.h>
 
 #define HOLDFAST_INLINE HWY_INLINE
-#define HOLDFAST_UNROLL _Pragma("GCC unroll 32")
+#define HOLDFAST_UNROLLED_FOR(...) _Pragma("GCC unroll 32") for (__VA_ARGS__)
 
 HWY_BEFORE_NAMESPACE();
 namespace holdfast { namespace kernel { namespace HWY_NAMESPACE {
