@@ -483,7 +483,7 @@ differentiateAlong(const Surface& surface,
   multiply(p.noise.S, change, along.mu);
   surface.applyG(along.mu, G_mu_a);
   HOLDFAST_UNROLLED_FOR (int k = 0; k < 3; ++k) {
-    Number row[kPolynomials], G_a_mu[d.kCount];
+    Number row[kPolynomials], G_a_mu[SurfaceDerivatives<Surface>::kCount];
     hessianRow(k, p.mu, row);
     surface.combine(row, G_a_mu);
     along.X[k] = p.g[k] * along.E_f + B[k] * p.E_f + G_mu_a[k] + G_a_mu[a];
