@@ -187,6 +187,19 @@ struct Problem {
   {
     return kernelState(surface, scatter);
   }
+
+  NormalSums normalSums() const
+  {
+    NormalSums sums;
+    kernel().accumulateNormal(model, residual, kernelView(), state(), sums);
+    return sums;
+  }
+  CovarianceSums covarianceSums() const
+  {
+    CovarianceSums sums;
+    kernel().accumulateCovariance(model, residual, kernelView(), state(), sums);
+    return sums;
+  }
 };
 
 // A positive definite covariance, sigmas of 1-4 mm.
@@ -241,7 +254,7 @@ randomProblem(Model model,
 
 constexpr double kNoiseSpread = 4e-3, kFarSpread = 0.3;
 
-class Kernel : public testing::TestWithParam<std::tuple<Model, Residual, double>> {
+class KernelSums : public testing::TestWithParam<std::tuple<Model, Residual, double>> {
 protected:
   Problem problem(Random& random, int count = 21) const
   {
@@ -264,22 +277,20 @@ expectClose(double actual, Real expected, Real magnitude, const std::string& wha
 
 constexpr std::uint64_t kCases = 5;
 
-TEST_P(Kernel, CostIsHalfTheSquaredResiduals)
+TEST_P(KernelSums, CostIsHalfTheSquaredResiduals)
 {
   for (std::uint64_t i = 0; i < kCases; ++i) {
     Random random(i);
     const Problem p = problem(random);
-    NormalSums normal;
-    CovarianceSums covariance;
-    accumulateNormal(p.model, p.residual, p.kernelView(), p.state(), normal);
-    accumulateCovariance(p.model, p.residual, p.kernelView(), p.state(), covariance);
+    const NormalSums normal = p.normalSums();
+    const CovarianceSums covariance = p.covarianceSums();
     const Real cost = p.cost(p.quadric());
     expectClose(normal.cost, cost, cost, "normal");
     expectClose(covariance.cost, cost, cost, "covariance");
   }
 }
 
-TEST_P(Kernel, SquaredResidualsAreTwiceTheCostOfEveryPoint)
+TEST_P(KernelSums, SquaredResidualsAreTwiceTheCostOfEveryPoint)
 {
   for (std::uint64_t i = 0; i < kCases; ++i) {
     Random random(i);
@@ -287,8 +298,12 @@ TEST_P(Kernel, SquaredResidualsAreTwiceTheCostOfEveryPoint)
     const Points all = p.kernelView();
     std::vector<double> fast(static_cast<std::size_t>(all.padded_size));
     std::vector<double> plain(fast.size());
-    squaredResiduals(p.model, p.residual, all, p.state(), fast.data());
-    reference::squaredResiduals(p.model, p.residual, all, p.state(), plain.data());
+    kernel().squaredResiduals(p.model, p.residual, all, p.state(), fast.data());
+    referenceKernel().squaredResiduals(p.model,
+                                       p.residual,
+                                       all,
+                                       p.state(),
+                                       plain.data());
     double sum = 0.0;
     for (std::size_t k = 0; k < fast.size(); ++k) {
       expectClose(fast[k], plain[k], 1.0 + plain[k], "fast");
@@ -301,13 +316,12 @@ TEST_P(Kernel, SquaredResidualsAreTwiceTheCostOfEveryPoint)
 }
 
 // L[p] is the derivative of the cost as f grows by epsilon p.
-TEST_P(Kernel, LIsTheDerivativeOfTheCostAlongAPolynomial)
+TEST_P(KernelSums, LIsTheDerivativeOfTheCostAlongAPolynomial)
 {
   for (std::uint64_t i = 0; i < kCases; ++i) {
     Random random(i);
     const Problem p = problem(random);
-    CovarianceSums covariance;
-    accumulateCovariance(p.model, p.residual, p.kernelView(), p.state(), covariance);
+    const CovarianceSums covariance = p.covarianceSums();
     constexpr int kRow[] = {0, 1, 2, 0, 0, 1}, kColumn[] = {0, 1, 2, 1, 2, 2};
     // L[z] of a plane is zero; its terms of 0.01 m or more cancel.
     Real magnitude_of_one = 0;
@@ -342,15 +356,13 @@ TEST_P(Kernel, LIsTheDerivativeOfTheCostAlongAPolynomial)
   }
 }
 
-TEST_P(Kernel, GradientIsTheDerivativeOfTheCost)
+TEST_P(KernelSums, GradientIsTheDerivativeOfTheCost)
 {
   for (std::uint64_t i = 0; i < kCases; ++i) {
     Random random(i);
     const Problem p = problem(random);
-    NormalSums normal;
-    CovarianceSums covariance;
-    accumulateNormal(p.model, p.residual, p.kernelView(), p.state(), normal);
-    accumulateCovariance(p.model, p.residual, p.kernelView(), p.state(), covariance);
+    const NormalSums normal = p.normalSums();
+    const CovarianceSums covariance = p.covarianceSums();
     for (int a = 0; a < parameterCount(p.model); ++a) {
       Real sum = 0, magnitude = 0;
       for (const Point& point : p.points) {
@@ -370,14 +382,13 @@ TEST_P(Kernel, GradientIsTheDerivativeOfTheCost)
   }
 }
 
-TEST_P(Kernel, JIsTheDerivativeOfTheResiduals)
+TEST_P(KernelSums, JIsTheDerivativeOfTheResiduals)
 {
   for (std::uint64_t i = 0; i < kCases; ++i) {
     Random random(i);
     const Problem p = problem(random);
     const int n = parameterCount(p.model);
-    NormalSums sums;
-    accumulateNormal(p.model, p.residual, p.kernelView(), p.state(), sums);
+    const NormalSums sums = p.normalSums();
     Matrix JtJ = Matrix::Zero(n, n);
     for (const Point& point : p.points) {
       Vector J(n);
@@ -399,12 +410,11 @@ TEST_P(Kernel, JIsTheDerivativeOfTheResiduals)
 }
 
 // Without the part L[f_ab] that has second derivatives of f: f linear in theta.
-TEST_P(Kernel, HIsTheHessianOfTheCostWithFLinearInTheta)
+TEST_P(KernelSums, HIsTheHessianOfTheCostWithFLinearInTheta)
 {
   Random random;
   const Problem p = problem(random);
-  CovarianceSums sums;
-  accumulateCovariance(p.model, p.residual, p.kernelView(), p.state(), sums);
+  const CovarianceSums sums = p.covarianceSums();
   const int n = shapeParameterCount(p.model);
   Matrix H(n, n);
   for (int a = 0; a < n; ++a)
@@ -451,7 +461,7 @@ differencedCrossTerms(const Problem& p)
   return X;
 }
 
-TEST_P(Kernel, CrossTermsAreMixedDerivativesOfTheCost)
+TEST_P(KernelSums, CrossTermsAreMixedDerivativesOfTheCost)
 {
   Random random;
   const Problem p = problem(random);
@@ -468,13 +478,12 @@ TEST_P(Kernel, CrossTermsAreMixedDerivativesOfTheCost)
 }
 
 // The other sums of the covariance follow from X_i, Sigma_i and the point.
-TEST_P(Kernel, CovarianceSumsAreThoseOfTheCrossTerms)
+TEST_P(KernelSums, CovarianceSumsAreThoseOfTheCrossTerms)
 {
   Random random;
   const Problem p = problem(random);
   const int n = parameterCount(p.model);
-  CovarianceSums sums;
-  accumulateCovariance(p.model, p.residual, p.kernelView(), p.state(), sums);
+  const CovarianceSums sums = p.covarianceSums();
   const std::vector<Matrix> terms = differencedCrossTerms(p);
   constexpr int kRow[6] = {0, 0, 0, 1, 1, 2}, kColumn[6] = {0, 1, 2, 1, 2, 2};
   Vector3 centroid;
@@ -552,10 +561,8 @@ TEST(KernelRay, ResidualIsTheDistanceAlongTheRay)
     Real t = 0;
     for (int i = 0; i < 20; ++i)
       t -= f(t) / derivative([&](Real x) { return f(t + x); });
-    NormalSums sums;
-    accumulateNormal(model, Residual::Ray, p.kernelView(), p.state(), sums);
     const Real distance = t * t * v.dot(point.S.inverse() * v);
-    EXPECT_NEAR(2.0 * sums.cost, static_cast<double>(distance), 1e-9);
+    EXPECT_NEAR(2.0 * p.normalSums().cost, static_cast<double>(distance), 1e-9);
   }
 }
 
@@ -599,10 +606,10 @@ using Entries = Eigen::Array<double, sizeof(Sums) / sizeof(double), 1>;
 // All sums of one kind as an array; what the model does not use stays zero.
 template <typename Sums, typename Accumulate>
 Entries<Sums>
-entriesOf(const Accumulate& accumulate, const Points& points)
+entriesOf(const Accumulate& accumulate, const Kernel& code, const Points& points)
 {
   Sums sums{};
-  accumulate(points, sums);
+  accumulate(code, points, sums);
   return Eigen::Map<const Entries<Sums>>(reinterpret_cast<const double*>(&sums));
 }
 
@@ -617,20 +624,23 @@ singlePoint(const Points& points, int i)
   return single;
 }
 
-// `fast` (points) against the sum of `reference` over single points. Products may be
-// fused in one and not in the other, which changes some units in the last place of
-// terms of which some cancel a hundredfold; what cancels altogether is compared with
+// The sums by `tested` against those of the reference over single points. Products
+// may be fused in one and not in the other, which changes some units in the last place
+// of terms of which some cancel a hundredfold; what cancels altogether is compared with
 // the largest entry of its group.
-template <typename Sums, typename Fast, typename Reference>
+template <typename Sums, typename Accumulate>
 void
-expectSumOfPoints(const PointBatch& batch, const Fast& fast, const Reference& reference)
+expectSumOfPoints(const PointBatch& batch,
+                  const Accumulate& accumulate,
+                  const Kernel& tested)
 {
   constexpr double kRounding = 1e-12, kCancelled = 1e-13;
   const Points points = kernelPoints(batch);
-  const Entries<Sums> actual = entriesOf<Sums>(fast, points);
+  const Entries<Sums> actual = entriesOf<Sums>(accumulate, tested, points);
   Entries<Sums> expected = Entries<Sums>::Zero(), magnitude = expected;
   for (int i = 0; i < batch.size(); ++i) {
-    const Entries<Sums> term = entriesOf<Sums>(reference, singlePoint(points, i));
+    const Entries<Sums> term =
+        entriesOf<Sums>(accumulate, referenceKernel(), singlePoint(points, i));
     expected += term;
     magnitude += term.abs();
   }
@@ -642,22 +652,23 @@ expectSumOfPoints(const PointBatch& batch, const Fast& fast, const Reference& re
       EXPECT_NEAR(actual[e],
                   expected[e],
                   kRounding * magnitude[e] + kCancelled * largest)
-          << "entry " << e << " of " << batch.size() << " points";
+          << tested.instruction_set << ", entry " << e << " of " << batch.size()
+          << " points";
   }
   EXPECT_EQ(e, actual.size());
 }
 
 // Both codes: the fast one shows that SIMD agrees, the reference that padding adds
 // nothing.
-template <typename Sums, typename Fast, typename Reference>
+template <typename Sums, typename Accumulate>
 void
-expectBothAgree(const PointBatch& batch, const Fast& fast, const Reference& reference)
+expectBothAgree(const PointBatch& batch, const Accumulate& accumulate)
 {
-  expectSumOfPoints<Sums>(batch, fast, reference);
-  expectSumOfPoints<Sums>(batch, reference, reference);
+  expectSumOfPoints<Sums>(batch, accumulate, kernel());
+  expectSumOfPoints<Sums>(batch, accumulate, referenceKernel());
 }
 
-TEST_P(Kernel, SimdSumsAreThoseOfThePointsWithoutPadding)
+TEST_P(KernelSums, SimdSumsAreThoseOfThePointsWithoutPadding)
 {
   for (int count = 1; count <= 17; ++count) {
     Random random(static_cast<std::uint64_t>(count));
@@ -667,19 +678,13 @@ TEST_P(Kernel, SimdSumsAreThoseOfThePointsWithoutPadding)
     state.centroid[0] += 0.01;
     expectBothAgree<NormalSums>(
         p.batch,
-        [&](const Points& points, NormalSums& sums) {
-          accumulateNormal(p.model, p.residual, points, state, sums);
-        },
-        [&](const Points& points, NormalSums& sums) {
-          reference::accumulateNormal(p.model, p.residual, points, state, sums);
+        [&](const Kernel& code, const Points& points, NormalSums& sums) {
+          code.accumulateNormal(p.model, p.residual, points, state, sums);
         });
     expectBothAgree<CovarianceSums>(
         p.batch,
-        [&](const Points& points, CovarianceSums& sums) {
-          accumulateCovariance(p.model, p.residual, points, state, sums);
-        },
-        [&](const Points& points, CovarianceSums& sums) {
-          reference::accumulateCovariance(p.model, p.residual, points, state, sums);
+        [&](const Kernel& code, const Points& points, CovarianceSums& sums) {
+          code.accumulateCovariance(p.model, p.residual, points, state, sums);
         });
   }
 }
@@ -693,19 +698,13 @@ TEST(KernelMoments, SimdSumsAreThoseOfThePointsWithoutPadding)
     const State state = p.state();
     expectBothAgree<ScatterSums>(
         p.batch,
-        [](const Points& points, ScatterSums& sums) {
-          accumulateScatter(points, sums);
-        },
-        [](const Points& points, ScatterSums& sums) {
-          reference::accumulateScatter(points, sums);
+        [](const Kernel& code, const Points& points, ScatterSums& sums) {
+          code.accumulateScatter(points, sums);
         });
     expectBothAgree<QuadricSums>(
         p.batch,
-        [&](const Points& points, QuadricSums& sums) {
-          accumulateQuadric(points, state.R, state.c, sums);
-        },
-        [&](const Points& points, QuadricSums& sums) {
-          reference::accumulateQuadric(points, state.R, state.c, sums);
+        [&](const Kernel& code, const Points& points, QuadricSums& sums) {
+          code.accumulateQuadric(points, state.R, state.c, sums);
         });
   }
 }
@@ -743,8 +742,8 @@ TEST(KernelMoments, AreThoseOfTheDefinition)
       randomProblem(Model::Paraboloid, Residual::Sampson, 13, kFarSpread, random);
   ScatterSums scatter;
   QuadricSums quadric;
-  accumulateScatter(p.kernelView(), scatter);
-  accumulateQuadric(p.kernelView(), p.state().R, p.state().c, quadric);
+  kernel().accumulateScatter(p.kernelView(), scatter);
+  kernel().accumulateQuadric(p.kernelView(), p.state().R, p.state().c, quadric);
   constexpr int kRow[6] = {0, 0, 0, 1, 1, 2}, kColumn[6] = {0, 1, 2, 1, 2, 2};
   double q[3] = {}, qq[6] = {}, sigma[6] = {}, monomial[15] = {}, z[6] = {};
   for (int i = 0; i < 13; ++i) {
@@ -840,7 +839,7 @@ const auto kModels =
 const auto kResiduals = testing::Values(Residual::Sampson, Residual::Ray);
 
 INSTANTIATE_TEST_SUITE_P(All,
-                         Kernel,
+                         KernelSums,
                          testing::Combine(kModels,
                                           kResiduals,
                                           testing::Values(kNoiseSpread, kFarSpread)),

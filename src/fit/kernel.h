@@ -141,44 +141,64 @@ struct CovarianceSums {
 /// positive definite covariance. The next ones need a closer look.
 int countLeadingValid(const Points& points);
 
-void accumulateScatter(const Points& points, ScatterSums& sums);
+namespace reference {
+int countLeadingValid(const Points& points);
+} // namespace reference
 
-void accumulateQuadric(const Points& points,
-                       const double R[9],
-                       const double c[3],
-                       QuadricSums& sums);
+/// The functions of the hot path, compiled for one instruction set.
+struct Kernel {
+  const char* instruction_set; ///< "AVX3", "AVX2", "SSE2", ..., "scalar" (reference)
 
-/// Moves every point along its ray from the viewpoint onto the quadric
-/// z = h[0] + h[1] x + h[2] y + h[3] x^2/2 + h[4] x y + h[5] y^2/2 of the frame (R, c),
-/// by two Newton steps; a point that would move by more than a tenth of its range
-/// stays.
-void moveOntoQuadric(const Points& points,
-                     const double R[9],
-                     const double c[3],
-                     const double h[6],
-                     const double viewpoint[3],
-                     double* const out[3]);
+  /// Sums for the centroid and the principal axes.
+  void (*accumulateScatter)(const Points& points, ScatterSums& sums);
 
-void accumulateNormal(Model model,
-                      Residual residual,
-                      const Points& points,
-                      const State& state,
-                      NormalSums& sums);
+  /// Sums for the least-squares quadric over the frame (R, c).
+  void (*accumulateQuadric)(const Points& points,
+                            const double R[9],
+                            const double c[3],
+                            QuadricSums& sums);
 
-void accumulateCovariance(Model model,
-                          Residual residual,
-                          const Points& points,
-                          const State& state,
-                          CovarianceSums& sums);
+  /// Moves every point along its ray from the viewpoint onto the quadric
+  /// z = h[0] + h[1] x + h[2] y + h[3] x^2/2 + h[4] x y + h[5] y^2/2 of the frame
+  /// (R, c), by two Newton steps; a point that would move by more than a tenth of its
+  /// range stays.
+  void (*moveOntoQuadric)(const Points& points,
+                          const double R[9],
+                          const double c[3],
+                          const double h[6],
+                          const double viewpoint[3],
+                          double* const out[3]);
 
-/// Squared residual of every point, padding included (zero there): twice its share of
-/// the cost. Of the state only R, c and k are used.
-/// \param out as many numbers as points.padded_size.
-void squaredResiduals(Model model,
-                      Residual residual,
-                      const Points& points,
-                      const State& state,
-                      double* out);
+  /// Sums for one iteration of the fit.
+  void (*accumulateNormal)(Model model,
+                           Residual residual,
+                           const Points& points,
+                           const State& state,
+                           NormalSums& sums);
+
+  /// Sums for the fit's exact covariance.
+  void (*accumulateCovariance)(Model model,
+                               Residual residual,
+                               const Points& points,
+                               const State& state,
+                               CovarianceSums& sums);
+
+  /// Squared residual of every point, padding included (zero there): twice its share of
+  /// the cost. Of the state only R, c and k are used. `out` holds points.padded_size
+  /// numbers.
+  void (*squaredResiduals)(Model model,
+                           Residual residual,
+                           const Points& points,
+                           const State& state,
+                           double* out);
+};
+
+/// The fastest one for this processor, chosen at the first call (from any thread).
+const Kernel& kernel();
+
+/// The reference code (number type double), whatever the machine offers: what tests and
+/// benchmarks compare the SIMD code with.
+const Kernel& referenceKernel();
 
 /// X_i of every point (p x 3 row-major each, local frame), for stages that correlate
 /// two fits; always the reference code.
@@ -187,40 +207,5 @@ void crossTerms(Model model,
                 const Points& points,
                 const State& state,
                 std::vector<double>& X);
-
-/// Instruction set in use: "AVX3", "AVX2", "SSE2", ... or "scalar".
-const char* instructionSet();
-
-/// The reference code (number type double), whatever the machine offers: what tests and
-/// benchmarks compare the SIMD code with.
-namespace reference {
-int countLeadingValid(const Points& points);
-void accumulateScatter(const Points& points, ScatterSums& sums);
-void accumulateQuadric(const Points& points,
-                       const double R[9],
-                       const double c[3],
-                       QuadricSums& sums);
-void moveOntoQuadric(const Points& points,
-                     const double R[9],
-                     const double c[3],
-                     const double h[6],
-                     const double viewpoint[3],
-                     double* const out[3]);
-void accumulateNormal(Model model,
-                      Residual residual,
-                      const Points& points,
-                      const State& state,
-                      NormalSums& sums);
-void accumulateCovariance(Model model,
-                          Residual residual,
-                          const Points& points,
-                          const State& state,
-                          CovarianceSums& sums);
-void squaredResiduals(Model model,
-                      Residual residual,
-                      const Points& points,
-                      const State& state,
-                      double* out);
-} // namespace reference
 
 }} // namespace holdfast::kernel

@@ -819,7 +819,7 @@ crossTermsOfPoints(const Points& points, const State& state, double* out)
 }
 
 inline void
-scatterSums(const Points& points, ScatterSums& out)
+accumulateScatter(const Points& points, ScatterSums& out)
 {
   Number q[3], qq[6], sigma[6];
   for (Number& sum : q)
@@ -848,10 +848,10 @@ scatterSums(const Points& points, ScatterSums& out)
 }
 
 inline void
-quadricSums(const Points& points,
-            const double R[9],
-            const double c[3],
-            QuadricSums& out)
+accumulateQuadric(const Points& points,
+                  const double R[9],
+                  const double c[3],
+                  QuadricSums& out)
 {
   Number monomial[15], height[6];
   for (Number& sum : monomial)
@@ -885,12 +885,12 @@ quadricSums(const Points& points,
 }
 
 inline void
-moveOnto(const Points& points,
-         const double R[9],
-         const double c[3],
-         const double h[6],
-         const double viewpoint[3],
-         double* const out[3])
+moveOntoQuadric(const Points& points,
+                const double R[9],
+                const double c[3],
+                const double h[6],
+                const double viewpoint[3],
+                double* const out[3])
 {
   Number origin[3], camera[3];
   HOLDFAST_UNROLLED_FOR (int k = 0; k < 3; ++k)
@@ -1002,31 +1002,47 @@ struct ResidualAction {
 };
 
 inline void
-normalSums(Model model,
-           Residual residual,
-           const Points& points,
-           const State& state,
-           NormalSums& sums)
+accumulateNormal(Model model,
+                 Residual residual,
+                 const Points& points,
+                 const State& state,
+                 NormalSums& sums)
 {
   forSurfaceAndResidual(model, residual, NormalAction{points, state, sums});
 }
 
 inline void
-covarianceSums(Model model,
-               Residual residual,
-               const Points& points,
-               const State& state,
-               CovarianceSums& sums)
+accumulateCovariance(Model model,
+                     Residual residual,
+                     const Points& points,
+                     const State& state,
+                     CovarianceSums& sums)
 {
   forSurfaceAndResidual(model, residual, CovarianceAction{points, state, sums});
 }
 
 inline void
-residualsOfPoints(Model model,
-                  Residual residual,
-                  const Points& points,
-                  const State& state,
-                  double* out)
+squaredResiduals(Model model,
+                 Residual residual,
+                 const Points& points,
+                 const State& state,
+                 double* out)
 {
   forSurfaceAndResidual(model, residual, ResidualAction{points, state, out});
+}
+
+// ---- The table --------------------------------------------------------------------
+
+// The functions above as callers see them, of the instruction set this file is being
+// compiled for.
+constexpr Kernel
+makeKernel(const char* instruction_set)
+{
+  return {instruction_set,
+          accumulateScatter,
+          accumulateQuadric,
+          moveOntoQuadric,
+          accumulateNormal,
+          accumulateCovariance,
+          squaredResiduals};
 }

@@ -69,6 +69,13 @@ struct CrossTermAction {
 
 } // namespace
 
+const Kernel&
+referenceKernel()
+{
+  static constexpr Kernel reference = makeKernel("scalar");
+  return reference;
+}
+
 void
 crossTerms(Model model,
            Residual residual,
@@ -85,62 +92,6 @@ int
 countLeadingValid(const Points& points)
 {
   return leadingValid(points);
-}
-
-void
-accumulateScatter(const Points& points, ScatterSums& sums)
-{
-  scatterSums(points, sums);
-}
-
-void
-accumulateQuadric(const Points& points,
-                  const double R[9],
-                  const double c[3],
-                  QuadricSums& sums)
-{
-  quadricSums(points, R, c, sums);
-}
-
-void
-accumulateNormal(Model model,
-                 Residual residual,
-                 const Points& points,
-                 const State& state,
-                 NormalSums& sums)
-{
-  normalSums(model, residual, points, state, sums);
-}
-
-void
-accumulateCovariance(Model model,
-                     Residual residual,
-                     const Points& points,
-                     const State& state,
-                     CovarianceSums& sums)
-{
-  covarianceSums(model, residual, points, state, sums);
-}
-
-void
-moveOntoQuadric(const Points& points,
-                const double R[9],
-                const double c[3],
-                const double h[6],
-                const double viewpoint[3],
-                double* const out[3])
-{
-  moveOnto(points, R, c, h, viewpoint, out);
-}
-
-void
-squaredResiduals(Model model,
-                 Residual residual,
-                 const Points& points,
-                 const State& state,
-                 double* out)
-{
-  residualsOfPoints(model, residual, points, state, out);
 }
 
 } // namespace reference

@@ -29,7 +29,7 @@ computeReferencePoints(PointBatch& batch, const Eigen::Vector3d& viewpoint)
   double* const out[3] = {batch.channel(PointBatch::RX),
                           batch.channel(PointBatch::RY),
                           batch.channel(PointBatch::RZ)};
-  kernel::moveOntoQuadric(points, R, c, h, camera, out);
+  kernel::kernel().moveOntoQuadric(points, R, c, h, camera, out);
 }
 
 } // namespace holdfast

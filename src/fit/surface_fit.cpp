@@ -98,11 +98,11 @@ struct SurfaceProblem {
   void evaluate(const State& state, Evaluation& evaluation) const
   {
     kernel::NormalSums sums;
-    kernel::accumulateNormal(model,
-                             residual,
-                             points,
-                             kernelState(state, scatter),
-                             sums);
+    kernel::kernel().accumulateNormal(model,
+                                      residual,
+                                      points,
+                                      kernelState(state, scatter),
+                                      sums);
     evaluation.cost = sums.cost;
     evaluation.gradient = gradientOf(model, sums.gradient);
     evaluation.JtJ.setIdentity();
@@ -328,11 +328,11 @@ polish(const SurfaceProblem& problem,
   const double start_cost = fit.cost;
   kernel::CovarianceSums sums;
   for (fit.polish_steps = 1; fit.polish_steps <= kMaxPolishSteps; ++fit.polish_steps) {
-    kernel::accumulateCovariance(problem.model,
-                                 problem.residual,
-                                 problem.points,
-                                 kernelState(fit.surface, problem.scatter),
-                                 sums);
+    kernel::kernel().accumulateCovariance(problem.model,
+                                          problem.residual,
+                                          problem.points,
+                                          kernelState(fit.surface, problem.scatter),
+                                          sums);
     linearize(fit.surface, problem.scatter, sums, fit.linearization);
     fit.cost = sums.cost;
     if (!fit.linearization.H.allFinite()) {
@@ -525,7 +525,7 @@ Scatter
 measureScatter(const PointBatch& batch, bool debias, const Eigen::Vector3d& viewpoint)
 {
   kernel::ScatterSums sums;
-  kernel::accumulateScatter(kernelPoints(batch), sums);
+  kernel::kernel().accumulateScatter(kernelPoints(batch), sums);
   Scatter scatter;
   scatter.count = batch.size();
   const double inverse = 1.0 / scatter.count;

@@ -23,7 +23,7 @@ leastSquaresQuadric(const kernel::Points& points, const Scatter& scatter)
     c[i] = scatter.mean[i];
   }
   kernel::QuadricSums sums;
-  kernel::accumulateQuadric(points, R, c, sums);
+  kernel::kernel().accumulateQuadric(points, R, c, sums);
   // Row and column e stand for the monomial of exponents (px, py).
   constexpr int px[6] = {0, 1, 0, 2, 1, 0}, py[6] = {0, 0, 1, 0, 1, 2};
   Eigen::Matrix<double, 6, 6> A;
@@ -159,11 +159,11 @@ costOf(const UnboundedSurface& surface,
        const Scatter& scatter)
 {
   kernel::NormalSums sums;
-  kernel::accumulateNormal(surface.model,
-                           residual,
-                           points,
-                           kernelState(surface, scatter),
-                           sums);
+  kernel::kernel().accumulateNormal(surface.model,
+                                    residual,
+                                    points,
+                                    kernelState(surface, scatter),
+                                    sums);
   return std::isfinite(sums.cost) ? sums.cost : std::numeric_limits<double>::max();
 }
 

@@ -182,11 +182,11 @@ PatchConsensus::Impl::squaredSigmas(const Patch& patch,
   blankInvalid(batch);
   batch.pad();
   std::vector<double> squared(static_cast<std::size_t>(batch.paddedSize()));
-  kernel::squaredResiduals(surface.model,
-                           options.fit.residual,
-                           kernelPoints(batch),
-                           kernelState(patch, surface.model, batch.origin()),
-                           squared.data());
+  kernel::kernel().squaredResiduals(surface.model,
+                                    options.fit.residual,
+                                    kernelPoints(batch),
+                                    kernelState(patch, surface.model, batch.origin()),
+                                    squared.data());
   squared.resize(indices.size());
   const double* weight = batch.channel(PointBatch::W);
   // Indefinite covariances make it negative.
