@@ -5,6 +5,7 @@
 #include "support/random_patch.h"
 
 #include "fit/boundary_fit.h"
+#include "geometry/symmetric.h"
 #include <holdfast/geometry/rotation.h>
 
 #include <Eigen/Eigenvalues>
@@ -38,13 +39,9 @@ struct Input {
 
   BoundedPatch bound() const
   {
-    return boundPatch(type,
-                      surface,
-                      scatter,
-                      has_plane ? &plane : nullptr,
-                      {0.7, -1.1, 0.4},
-                      ContainmentFactors::of(kContainment),
-                      smooth);
+    return boundPatch(
+        {type, surface, scatter, has_plane ? &plane : nullptr, {0.7, -1.1, 0.4}},
+        {ContainmentFactors::of(kContainment), smooth});
   }
 };
 
@@ -109,8 +106,7 @@ moved(const Input& in, const Joint& joint)
   const Eigen::Matrix3d& R = in.surface.R;
   out.scatter.mean += R * joint.segment<3>(JointLayout::kMean);
   const auto s = joint.segment<6>(JointLayout::kScatter);
-  Eigen::Matrix3d dC;
-  dC << s[0], s[1], s[2], s[1], s[3], s[4], s[2], s[4], s[5];
+  const Eigen::Matrix3d dC = symmetric::matrixOf(s);
   out.scatter.covariance += R * dC * R.transpose();
   findAxes(out.scatter, in.scatter.normal());
   const auto theta = joint.head<6>();

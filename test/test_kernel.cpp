@@ -4,6 +4,7 @@
 
 #include "fit/kernel.h"
 #include "fit/surface_fit.h"
+#include "geometry/symmetric.h"
 #include <holdfast/fit/point_batch.h>
 
 #include <functional>
@@ -485,7 +486,7 @@ TEST_P(KernelSums, CovarianceSumsAreThoseOfTheCrossTerms)
   const int n = parameterCount(p.model);
   const CovarianceSums sums = p.covarianceSums();
   const std::vector<Matrix> terms = differencedCrossTerms(p);
-  constexpr int kRow[6] = {0, 0, 0, 1, 1, 2}, kColumn[6] = {0, 1, 2, 1, 2, 2};
+  using symmetric::kColumn, symmetric::kRow;
   Vector3 centroid;
   for (int k = 0; k < 3; ++k)
     centroid[k] = p.state().centroid[k];
@@ -744,7 +745,7 @@ TEST(KernelMoments, AreThoseOfTheDefinition)
   QuadricSums quadric;
   kernel().accumulateScatter(p.kernelView(), scatter);
   kernel().accumulateQuadric(p.kernelView(), p.state().R, p.state().c, quadric);
-  constexpr int kRow[6] = {0, 0, 0, 1, 1, 2}, kColumn[6] = {0, 1, 2, 1, 2, 2};
+  using symmetric::kColumn, symmetric::kRow;
   double q[3] = {}, qq[6] = {}, sigma[6] = {}, monomial[15] = {}, z[6] = {};
   for (int i = 0; i < 13; ++i) {
     const Eigen::Vector3d offset = p.batch.point(i) - p.batch.origin();
@@ -788,8 +789,7 @@ TEST_P(FittedSurface, HasZeroGradientAndTheHessianOfTheCost)
   FitOptions options;
   options.residual = residual;
   options.polish_tolerance_sigma = 1e-11;
-  NullSpace null_space;
-  const SurfaceFit fit = fitSurface(model, p.batch, p.scatter, options, null_space);
+  const SurfaceFit fit = fitSurface(model, p.batch, p.scatter, options);
   ASSERT_EQ(fit.status, FitStatus::Converged);
   p.surface = fit.surface;
   p.enterFrame();

@@ -1,4 +1,6 @@
 #include "boundary_fit.h"
+
+#include "geometry/symmetric.h"
 #include <holdfast/geometry/rotation.h>
 
 #include <Eigen/Geometry>
@@ -7,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace holdfast {
 namespace {
@@ -69,9 +72,9 @@ measureMoments(const Placement& placement,
   f.dxx = 2.0 * (M(0, 1) * dz - M(0, 2) * dy);
   f.dyy = 2.0 * (M(1, 2) * dx - M(0, 1) * dz);
   f.dxy = M(0, 2) * dx - M(1, 2) * dy + (M(1, 1) - M(0, 0)) * dz;
-  constexpr int kRow[6] = {0, 0, 0, 1, 1, 2}, kColumn[6] = {0, 1, 2, 1, 2, 2};
-  for (int e = 0; e < 6; ++e) {
-    const int i = kRow[e], j = kColumn[e], column = JointLayout::kScatter + e;
+  for (int e = 0; e < symmetric::kSize; ++e) {
+    const int i = symmetric::kRow[e], j = symmetric::kColumn[e];
+    const int column = JointLayout::kScatter + e;
     const double twice = i == j ? 1.0 : 2.0;
     f.dxx[column] += twice * W(0, i) * W(0, j);
     f.dyy[column] += twice * W(1, i) * W(1, j);
@@ -179,26 +182,25 @@ placeSphere(const UnboundedSurface& surface, const NormalMap& normal)
 }
 
 // I-2 (ii), s = circular cylinder: z' = normalise(n - x x^T n) (paper eq. (5): [x y z]
-// is a rotation only with z normal to x), apex on the axis' near side. \return false
-// when n is along the axis.
-bool
-placeCylinder(const UnboundedSurface& surface, const NormalMap& normal, Placement& p)
+// is a rotation only with z normal to x), apex on the axis' near side. None when n is
+// along the axis.
+std::optional<Placement>
+placeCylinder(const UnboundedSurface& surface, const NormalMap& normal)
 {
   constexpr double kSmallestSine = 1e-3;
   const double k = safeGap(surface.k[0], 1.0);
   const double across = std::hypot(normal.n.y(), normal.n.z());
   if (across < kSmallestSine)
-    return false;
+    return std::nullopt;
   const Eigen::Vector3d x = Eigen::Vector3d::UnitX(), z = Eigen::Vector3d::UnitZ();
   const Eigen::Vector3d up(0.0, normal.n.y() / across, normal.n.z() / across);
   Rows3 tilt = Rows3::Zero(); // delta of the fit
   tilt(1, 1) = tilt(2, 2) = 1.0;
   const Rows3 dn = normal.dn + skew(normal.n) * tilt; // n seen from the moving frame
   const Row roll = (up.y() * dn.row(2) - up.z() * dn.row(1)) / across; // about x
-  p.R = surface.R;
+  Placement p{surface.R, surface.c + surface.R * (z - up) / k};
   p.R.col(2) = surface.R * up;
   p.R.col(1) = p.R.col(2).cross(p.R.col(0));
-  p.c = surface.c + surface.R * (z - up) / k;
   p.delta = tilt;
   p.delta.row(0) += roll;
   p.gamma = (skew(z - up) * tilt / -k).eval();
@@ -206,19 +208,12 @@ placeCylinder(const UnboundedSurface& surface, const NormalMap& normal, Placemen
   p.gamma(1, 3) += 1.0;
   p.gamma(2, 4) += 1.0;
   p.gamma.col(0) += (up - z) / (k * k);
-  return true;
-}
-
-// Brings rows from the axes of the surface into those of the frame R.
-void
-turnRows(const Eigen::Matrix3d& W, Placement& p)
-{
-  p.delta = (W * p.delta).eval();
-  p.gamma = (W * p.gamma).eval();
+  return p;
 }
 
 // The frame of a revolute type, R = Exp([rx ry 0]) with the same z; its twist about z
 // follows from r_z = 0. r_xy is off the chart's singularity (regularRxyFromNormal).
+// \return d r_xy
 Rows2
 orientRevolute(const Eigen::Vector2d& r_xy, Placement& p)
 {
@@ -232,7 +227,7 @@ orientRevolute(const Eigen::Vector2d& r_xy, Placement& p)
 
 // The curvature matrix in the axes of the final frame, with its rows.
 struct CurvatureMap {
-  double xx, xy, yy;
+  double xx = 0.0, xy = 0.0, yy = 0.0;
   Row dxx = Row::Zero(), dxy = Row::Zero(), dyy = Row::Zero();
 };
 
@@ -265,6 +260,29 @@ principalCurvatureAxes(const UnboundedSurface& surface)
   if (mean > 0.0)
     R = turnedAboutZ(R, 0.0, 1.0);
   return canonicalAxes(R);
+}
+
+// The placement turned to the axes R, and its moments there. `twist` may complete the
+// rows of the placement, then in those axes; W: to them from those of the surface.
+template <typename Twist>
+MomentFrame
+turnedFrame(const BoundRequest& request,
+            Placement p,
+            const Eigen::Matrix3d& R,
+            Twist&& twist)
+{
+  const Eigen::Matrix3d W = R.transpose() * request.surface.R;
+  p.R = R;
+  p.delta = (W * p.delta).eval();
+  p.gamma = (W * p.gamma).eval();
+  twist(p, W);
+  return measureMoments(p, request.scatter, W);
+}
+
+MomentFrame
+turnedFrame(const BoundRequest& request, const Placement& p, const Eigen::Matrix3d& R)
+{
+  return turnedFrame(request, p, R, [](Placement&, const Eigen::Matrix3d&) {});
 }
 
 // Fills a bounded patch: value and Jacobian rows group by group.
@@ -309,6 +327,7 @@ public:
     centre(f, origin);
   }
 
+  // dr as from orientRevolute().
   void revolutePose(const MomentFrame& f,
                     const Eigen::Vector2d& r_xy,
                     const Rows2& dr,
@@ -363,23 +382,23 @@ writeCircle(PatchWriter& writer,
 
 // II-8.
 BoundedPatch
-boundTwoCurvatures(PatchType type,
-                   const UnboundedSurface& surface,
-                   const Scatter& scatter,
-                   const Eigen::Vector3d& origin,
-                   double lambda)
+boundTwoCurvatures(const BoundRequest& request, const BoundSettings& settings)
 {
   BoundedPatch out;
-  PatchWriter writer(type, out);
-  Placement p = placeParaboloid(surface, scatter);
-  p.R = principalCurvatureAxes(surface);
-  const Eigen::Matrix3d W = p.R.transpose() * surface.R;
-  turnRows(W, p);
-  const CurvatureMap K = curvatureMap(surface.k, W);
-  const double scale = std::max(std::abs(K.xx), std::abs(K.yy));
-  p.delta.row(2) = K.dxy / safeGap(K.xx - K.yy, scale);
-  MomentFrame f = measureMoments(p, scatter, W);
-  if (type.surface == SurfaceType::CylindricParaboloid) { // II-6
+  PatchWriter writer(request.type, out);
+  const UnboundedSurface& surface = request.surface;
+  const SurfaceType type = request.type.surface;
+  CurvatureMap K;
+  MomentFrame f = turnedFrame(request,
+                              placeParaboloid(surface, request.scatter),
+                              principalCurvatureAxes(surface),
+                              [&](Placement& p, const Eigen::Matrix3d& W) {
+                                K = curvatureMap(surface.k, W);
+                                const double scale =
+                                    std::max(std::abs(K.xx), std::abs(K.yy));
+                                p.delta.row(2) = K.dxy / safeGap(K.xx - K.yy, scale);
+                              });
+  if (type == SurfaceType::CylindricParaboloid) { // II-6
     recentre(f, false);
     writer.curvature(0, K.yy, K.dyy);
   }
@@ -387,78 +406,74 @@ boundTwoCurvatures(PatchType type,
     writer.curvature(0, K.xx, K.dxx);
     writer.curvature(1, K.yy, K.dyy);
     const bool opposite = K.xx * K.yy < 0.0;
-    if (opposite != (type.surface == SurfaceType::HyperbolicParaboloid))
+    if (opposite != (type == SurfaceType::HyperbolicParaboloid))
       out.status = FitStatus::CurvatureSignMismatch;
   }
   const SecondMoments v = secondMoments(f);
-  writer.boundFromMoment(0, lambda, v.x, v.dx);
-  writer.boundFromMoment(1, lambda, v.y, v.dy);
-  writer.pose(f, origin);
+  writer.boundFromMoment(0, settings.factors.lambda, v.x, v.dx);
+  writer.boundFromMoment(1, settings.factors.lambda, v.y, v.dy);
+  writer.pose(f, request.origin);
   return out;
 }
 
 // II-7.
 BoundedPatch
-boundRevolute(PatchType type,
-              const UnboundedSurface& surface,
-              const Scatter& scatter,
-              const UnboundedSurface* plane,
-              const Eigen::Vector3d& origin,
-              double lambda,
-              bool smooth)
+boundRevolute(const BoundRequest& request, const BoundSettings& settings)
 {
   BoundedPatch out;
-  PatchWriter writer(type, out);
-  const bool sphere = type.surface == SurfaceType::Sphere;
-  const NormalMap normal = normalMap(surface, scatter, plane);
-  Placement p =
-      sphere ? placeSphere(surface, normal) : placeParaboloid(surface, scatter);
+  PatchWriter writer(request.type, out);
+  const UnboundedSurface& surface = request.surface;
+  const bool sphere = request.type.surface == SurfaceType::Sphere;
+  const NormalMap normal = normalMap(surface, request.scatter, request.plane);
+  const Placement placed =
+      sphere ? placeSphere(surface, normal) : placeParaboloid(surface, request.scatter);
   const Eigen::Vector3d z = sphere ? Eigen::Vector3d(surface.R * normal.n) :
                                      Eigen::Vector3d(surface.R.col(2));
   const Eigen::Vector2d r_xy = regularRxyFromNormal(z);
-  p.R = expMap({r_xy.x(), r_xy.y(), 0.0});
-  const Eigen::Matrix3d W = p.R.transpose() * surface.R;
-  turnRows(W, p);
-  const Rows2 dr = orientRevolute(r_xy, p);
-  const MomentFrame f = measureMoments(p, scatter, W);
+  Rows2 dr;
+  const MomentFrame f = turnedFrame(
+      request,
+      placed,
+      expMap({r_xy.x(), r_xy.y(), 0.0}),
+      [&](Placement& p, const Eigen::Matrix3d&) { dr = orientRevolute(r_xy, p); });
   Row dk = Row::Zero();
   dk[0] = sphere ? 1.0 : 0.5;
   dk[2] = sphere ? 0.0 : 0.5;
   writer.curvature(0, dk[0] * surface.k[0] + dk[2] * surface.k[2], dk);
   const SecondMoments v = secondMoments(f);
-  writeCircle(writer, v.x, v.y, v.dx, v.dy, lambda, smooth);
-  writer.revolutePose(f, r_xy, dr, origin);
+  writeCircle(writer,
+              v.x,
+              v.y,
+              v.dx,
+              v.dy,
+              settings.factors.lambda,
+              settings.smooth_circle_radius);
+  writer.revolutePose(f, r_xy, dr, request.origin);
   return out;
 }
 
 // II-6 for the circular cylinder.
 BoundedPatch
-boundCylinder(PatchType type,
-              const UnboundedSurface& surface,
-              const Scatter& scatter,
-              const UnboundedSurface* plane,
-              const Eigen::Vector3d& origin,
-              double lambda)
+boundCylinder(const BoundRequest& request, const BoundSettings& settings)
 {
   BoundedPatch out;
-  PatchWriter writer(type, out);
-  Placement p;
-  if (!placeCylinder(surface, normalMap(surface, scatter, plane), p)) {
+  PatchWriter writer(request.type, out);
+  const UnboundedSurface& surface = request.surface;
+  const std::optional<Placement> placed =
+      placeCylinder(surface, normalMap(surface, request.scatter, request.plane));
+  if (!placed) {
     out.status = FitStatus::Degenerate;
     return out;
   }
-  p.R = canonicalAxes(p.R);
-  const Eigen::Matrix3d W = p.R.transpose() * surface.R;
-  turnRows(W, p);
-  MomentFrame f = measureMoments(p, scatter, W);
+  MomentFrame f = turnedFrame(request, *placed, canonicalAxes(placed->R));
   recentre(f, false);
   Row dk = Row::Zero();
   dk[0] = 1.0;
   writer.curvature(0, surface.k[0], dk);
   const SecondMoments v = secondMoments(f);
-  writer.boundFromMoment(0, lambda, v.x, v.dx);
-  writer.boundFromMoment(1, lambda, v.y, v.dy);
-  writer.pose(f, origin);
+  writer.boundFromMoment(0, settings.factors.lambda, v.x, v.dx);
+  writer.boundFromMoment(1, settings.factors.lambda, v.y, v.dy);
+  writer.pose(f, request.origin);
   return out;
 }
 
@@ -480,30 +495,29 @@ principalScatterAxes(const Eigen::Matrix3d& R, const Scatter& scatter)
 
 // II-9, circle.
 BoundedPatch
-boundPlaneCircle(PatchType type,
-                 const UnboundedSurface& surface,
-                 const Scatter& scatter,
-                 const Eigen::Vector3d& origin,
-                 double factor,
-                 bool smooth)
+boundPlaneCircle(const BoundRequest& request, const BoundSettings& settings)
 {
   BoundedPatch out;
-  PatchWriter writer(type, out);
-  Placement p = placePlaneOf(surface, scatter);
+  PatchWriter writer(request.type, out);
+  const UnboundedSurface& surface = request.surface;
   const Eigen::Vector2d r_xy = regularRxyFromNormal(surface.R.col(2));
   // The larger moment is that of the principal axes; the sum is the same in any.
-  p.R = principalScatterAxes(surface.R, scatter);
-  const Eigen::Matrix3d W = p.R.transpose() * surface.R;
-  turnRows(W, p);
-  MomentFrame f = measureMoments(p, scatter, W);
+  MomentFrame f = turnedFrame(request,
+                              placePlaneOf(surface, request.scatter),
+                              principalScatterAxes(surface.R, request.scatter));
   recentre(f, true);
   const double scale = std::sqrt(2.0); // l = sqrt(-ln(1-Gamma)) sqrt(2 x moment)
-  writeCircle(writer, f.M(0, 0), f.M(1, 1), f.dxx, f.dyy, scale * factor, smooth);
+  writeCircle(writer,
+              f.M(0, 0),
+              f.M(1, 1),
+              f.dxx,
+              f.dyy,
+              scale * settings.factors.plane,
+              settings.smooth_circle_radius);
 
   Placement revolute{expMap({r_xy.x(), r_xy.y(), 0.0}), f.c};
   revolute.delta = revolute.R.transpose() * f.R * f.delta;
-  const Rows2 dr = orientRevolute(r_xy, revolute);
-  writer.revolutePose(f, r_xy, dr, origin);
+  writer.revolutePose(f, r_xy, orientRevolute(r_xy, revolute), request.origin);
   return out;
 }
 
@@ -511,26 +525,26 @@ boundPlaneCircle(PatchType type,
 // In the principal axes alpha = M_xx, phi = M_yy, beta = 0, and l+-^2 = 2 (alpha, phi)
 // times -ln(1 - Gamma).
 BoundedPatch
-boundPlane(PatchType type,
-           const UnboundedSurface& surface,
-           const Scatter& scatter,
-           const Eigen::Vector3d& origin,
-           double factor)
+boundPlane(const BoundRequest& request, const BoundSettings& settings)
 {
   BoundedPatch out;
-  PatchWriter writer(type, out);
-  Placement p = placePlaneOf(surface, scatter);
-  p.R = principalScatterAxes(surface.R, scatter);
-  const Eigen::Matrix3d W = p.R.transpose() * surface.R;
-  turnRows(W, p);
-  MomentFrame f = measureMoments(p, scatter, W);
-  // dt = ((alpha - phi) dbeta - beta (dalpha - dphi)) / (2 D) at beta = 0.
-  const double gap = safeGap(f.M(0, 0) - f.M(1, 1), f.M(0, 0));
-  p.delta.row(2) += f.dxy / gap;
-  f = measureMoments(p, scatter, W);
+  PatchWriter writer(request.type, out);
+  const Scatter& scatter = request.scatter;
+  MomentFrame f = turnedFrame(request,
+                              placePlaneOf(request.surface, scatter),
+                              principalScatterAxes(request.surface.R, scatter),
+                              [&](Placement& p, const Eigen::Matrix3d& W) {
+                                // dt = ((alpha - phi) dbeta - beta (dalpha - dphi)) /
+                                // (2 D) at beta = 0.
+                                const MomentFrame untwisted =
+                                    measureMoments(p, scatter, W);
+                                const Eigen::Matrix3d& M = untwisted.M;
+                                p.delta.row(2) +=
+                                    untwisted.dxy / safeGap(M(0, 0) - M(1, 1), M(0, 0));
+                              });
   recentre(f, true);
-  const double scale = std::sqrt(2.0) * factor;
-  if (type.boundary != BoundaryType::Quad) {
+  const double scale = std::sqrt(2.0) * settings.factors.plane;
+  if (request.type.boundary != BoundaryType::Quad) {
     writer.boundFromMoment(0, scale, f.M(0, 0), f.dxx);
     writer.boundFromMoment(1, scale, f.M(1, 1), f.dyy);
   }
@@ -544,7 +558,7 @@ boundPlane(PatchType type,
         sum > 0.0 ? Row((alpha * f.dyy - phi * f.dxx) / (2.0 * sum)) : Row(Row::Zero());
     writer.bound(4, std::atan2(std::sqrt(phi), std::sqrt(alpha)), dgamma);
   }
-  writer.pose(f, origin);
+  writer.pose(f, request.origin);
   return out;
 }
 
@@ -558,41 +572,23 @@ ContainmentFactors::of(double containment)
 }
 
 BoundedPatch
-boundPatch(PatchType type,
-           const UnboundedSurface& surface,
-           const Scatter& scatter,
-           const UnboundedSurface* plane,
-           const Eigen::Vector3d& origin,
-           const ContainmentFactors& factors,
-           bool smooth_circle_radius)
+boundPatch(const BoundRequest& request, const BoundSettings& settings)
 {
-  switch (type.surface) {
+  switch (request.type.surface) {
   case SurfaceType::Plane:
-    if (type.boundary == BoundaryType::Circle)
-      return boundPlaneCircle(type,
-                              surface,
-                              scatter,
-                              origin,
-                              factors.plane,
-                              smooth_circle_radius);
-    return boundPlane(type, surface, scatter, origin, factors.plane);
+    return isRevolute(request.type) ? boundPlaneCircle(request, settings) :
+                                      boundPlane(request, settings);
   case SurfaceType::Sphere:
   case SurfaceType::CircularParaboloid:
-    return boundRevolute(type,
-                         surface,
-                         scatter,
-                         plane,
-                         origin,
-                         factors.lambda,
-                         smooth_circle_radius);
+    return boundRevolute(request, settings);
   case SurfaceType::CircularCylinder:
-    return boundCylinder(type, surface, scatter, plane, origin, factors.lambda);
+    return boundCylinder(request, settings);
   case SurfaceType::EllipticParaboloid:
   case SurfaceType::HyperbolicParaboloid:
   case SurfaceType::CylindricParaboloid:
     break;
   }
-  return boundTwoCurvatures(type, surface, scatter, origin, factors.lambda);
+  return boundTwoCurvatures(request, settings);
 }
 
 } // namespace holdfast

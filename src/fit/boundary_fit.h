@@ -44,16 +44,25 @@ struct BoundedPatch {
   PatchJacobian jacobian;
 };
 
-/// Bounds a fitted surface as a patch of the given type and brings it into canonical
-/// form. \param origin of the batch, world frame. \param plane the weighted plane that
-/// gives sphere and cylinder their normal; null: the
-///        normal of the scatter.
-BoundedPatch boundPatch(PatchType type,
-                        const UnboundedSurface& surface,
-                        const Scatter& scatter,
-                        const UnboundedSurface* plane,
-                        const Eigen::Vector3d& origin,
-                        const ContainmentFactors& factors,
-                        bool smooth_circle_radius);
+/// What is to be bounded, for one call: it refers to what it is made of.
+struct BoundRequest {
+  PatchType type;
+  const UnboundedSurface& surface;
+  const Scatter& scatter;
+  /// The weighted plane that gives sphere and cylinder their normal; null: the normal
+  /// of the scatter.
+  const UnboundedSurface* plane;
+  Eigen::Vector3d origin; ///< of the batch, world frame
+};
+
+/// How it is bounded, the same for every patch.
+struct BoundSettings {
+  ContainmentFactors factors;
+  bool smooth_circle_radius = true; ///< see FitOptions
+};
+
+/// Bounds a fitted surface as a patch of the requested type and brings it into
+/// canonical form.
+BoundedPatch boundPatch(const BoundRequest& request, const BoundSettings& settings);
 
 } // namespace holdfast

@@ -54,7 +54,8 @@ PatchFitter::PatchFitter(const FitOptions& options) : options_(options)
   const std::string error = validityError(options);
   if (!error.empty())
     throw std::invalid_argument(error);
-  factors_ = ContainmentFactors::of(options.containment);
+  bound_settings_ = {ContainmentFactors::of(options.containment),
+                     options.smooth_circle_radius};
   thresholds_ = DiscriminationThresholds::atLevel(options.discrimination_level);
 }
 
@@ -97,19 +98,9 @@ PatchFitter::patchType(const PatchFit& fit) const
 }
 
 BoundedPatch
-PatchFitter::bound(PatchType type,
-                   const UnboundedSurface& surface,
-                   const Scatter& scatter,
-                   const UnboundedSurface* plane,
-                   const Eigen::Vector3d& origin) const
+PatchFitter::bound(const BoundRequest& request) const
 {
-  return boundPatch(type,
-                    surface,
-                    scatter,
-                    plane,
-                    origin,
-                    factors_,
-                    options_.smooth_circle_radius);
+  return boundPatch(request, bound_settings_);
 }
 
 PatchFit
@@ -138,14 +129,16 @@ PatchFitter::fit(PointBatch& batch) const
   fit.has_plane_stage =
       !options_.normal_from_pca && (model == Model::Sphere || model == Model::Cylinder);
   if (fit.has_plane_stage) {
-    fit.plane = fitSurface(Model::Plane, batch, fit.scatter, options_, fit.null_space);
+    fit.plane = fitSurface(Model::Plane, batch, fit.scatter, options_);
     fit.status = fit.plane.status;
+    fit.null_space = fit.plane.null_space;
     if (fit.status != FitStatus::Converged)
       return fit;
   }
   // Stage I-2 (for planes: I-1's refit).
-  fit.surface = fitSurface(model, batch, fit.scatter, options_, fit.null_space);
+  fit.surface = fitSurface(model, batch, fit.scatter, options_);
   fit.status = fit.surface.status;
+  fit.null_space = fit.surface.null_space;
   if (fit.status != FitStatus::Converged && fit.status != FitStatus::IterationLimit)
     return fit;
   if (!curvatureInRange(fit.surface, options_.max_curvature_per_m)) {
@@ -153,11 +146,11 @@ PatchFitter::fit(PointBatch& batch) const
     return fit;
   }
   // Stage I-3, then II-4 to II-9.
-  fit.bounded = bound(patchType(fit),
-                      fit.surface.surface,
-                      fit.scatter,
-                      fit.normalPlane(),
-                      batch.origin());
+  fit.bounded = bound({patchType(fit),
+                       fit.surface.surface,
+                       fit.scatter,
+                       fit.normalPlane(),
+                       batch.origin()});
   if (fit.status == FitStatus::Converged)
     fit.status = fit.bounded.status;
   return fit;

@@ -42,11 +42,7 @@ public:
 
   /// Stages II-4 to II-9 again, for a surface near the fitted one (what a second-order
   /// propagation differentiates).
-  BoundedPatch bound(PatchType type,
-                     const UnboundedSurface& surface,
-                     const Scatter& scatter,
-                     const UnboundedSurface* plane,
-                     const Eigen::Vector3d& origin) const;
+  BoundedPatch bound(const BoundRequest& request) const;
 
   const FitOptions& options() const
   {
@@ -57,7 +53,7 @@ private:
   PatchType patchType(const PatchFit& fit) const;
 
   FitOptions options_;
-  ContainmentFactors factors_;
+  BoundSettings bound_settings_;
   DiscriminationThresholds thresholds_;
 };
 

@@ -3,6 +3,7 @@
 #include <holdfast/geometry/rotation.h>
 
 #include "fit/surface_start.h"
+#include "geometry/symmetric.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -252,8 +253,7 @@ momentCross(const UnboundedSurface& surface,
 MomentMatrix
 momentCovariance(const kernel::CovarianceSums& sums, int count)
 {
-  constexpr int kIndex[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
-  constexpr int kRow[6] = {0, 0, 0, 1, 1, 2}, kColumn[6] = {0, 1, 2, 1, 2, 2};
+  using symmetric::kColumn, symmetric::kIndex, symmetric::kRow;
   const double scale = 1.0 / (static_cast<double>(count) * count);
   MomentMatrix DD;
   for (int i = 0; i < 3; ++i)
@@ -317,10 +317,7 @@ statusOf(LevenbergMarquardtSummary::Stop stop)
 // Exact Newton steps; the sums of the last one also give the covariance. Newton is
 // blind to the cost: where it climbs away from the start, the start is kept.
 void
-polish(const SurfaceProblem& problem,
-       const FitOptions& options,
-       SurfaceFit& fit,
-       NullSpace& null_space)
+polish(const SurfaceProblem& problem, const FitOptions& options, SurfaceFit& fit)
 {
   // More than rounding, less than matters: half a unit of chi-square.
   constexpr double kClimb = 0.25;
@@ -344,7 +341,7 @@ polish(const SurfaceProblem& problem,
     const ScaledCholesky cholesky(fit.linearization.H, problem.model);
     if (cholesky.smallestPivot() < kSmallestPivot) {
       fit.status = FitStatus::Degenerate;
-      null_space = nullSpaceOf(fit.linearization.H, problem.model);
+      fit.null_space = nullSpaceOf(fit.linearization.H, problem.model);
       return;
     }
     const Theta gradient = gradientOf(problem.model, sums.gradient);
@@ -394,10 +391,7 @@ approach(SurfaceProblem problem, const FitOptions& options, UnboundedSurface& su
 
 // Damped Gauss-Newton steps, then exact Newton steps, from fit.surface.
 void
-descend(const SurfaceProblem& problem,
-        const FitOptions& options,
-        SurfaceFit& fit,
-        NullSpace& null_space)
+descend(const SurfaceProblem& problem, const FitOptions& options, SurfaceFit& fit)
 {
   SurfaceProblem::Evaluation evaluation;
   const LevenbergMarquardtOptions lm{options.max_iterations,
@@ -412,12 +406,12 @@ descend(const SurfaceProblem& problem,
   if (fit.status != FitStatus::NonFinite &&
       ScaledCholesky(evaluation.JtJ, problem.model).smallestPivot() < kSmallestPivot) {
     fit.status = FitStatus::Degenerate;
-    null_space = nullSpaceOf(evaluation.JtJ, problem.model);
+    fit.null_space = nullSpaceOf(evaluation.JtJ, problem.model);
   }
   // Where residuals are large, Gauss-Newton may circle the minimum that Newton then
   // finds.
   if (fit.status == FitStatus::Converged || fit.status == FitStatus::IterationLimit)
-    polish(problem, options, fit, null_space);
+    polish(problem, options, fit);
 }
 
 // Of two fits to the same points; the former one where they agree within rounding.
@@ -438,24 +432,17 @@ isBetter(const SurfaceFit& later, const SurfaceFit& former)
 SurfaceFit
 fitThick(const SurfaceProblem& problem,
          const FitOptions& options,
-         const UnboundedSurface& start,
-         NullSpace& null_space)
+         const UnboundedSurface& start)
 {
-  const auto fitFlattened = [&](double share_of_curvature, NullSpace& undetermined) {
+  const auto fitFlattened = [&](double share_of_curvature) {
     SurfaceFit fit;
     fit.surface = start;
     fit.surface.k *= share_of_curvature;
-    descend(problem, options, fit, undetermined);
+    descend(problem, options, fit);
     return fit;
   };
-  SurfaceFit best = fitFlattened(0.8, null_space);
-  NullSpace undetermined(6, 0);
-  const SurfaceFit other = fitFlattened(0.65, undetermined);
-  if (isBetter(other, best)) {
-    best = other;
-    null_space = undetermined;
-  }
-  return best;
+  const SurfaceFit steeper = fitFlattened(0.8), flatter = fitFlattened(0.65);
+  return isBetter(flatter, steeper) ? flatter : steeper;
 }
 
 } // namespace
@@ -529,7 +516,7 @@ measureScatter(const PointBatch& batch, bool debias, const Eigen::Vector3d& view
   Scatter scatter;
   scatter.count = batch.size();
   const double inverse = 1.0 / scatter.count;
-  constexpr int kIndex[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+  using symmetric::kIndex;
   for (int i = 0; i < 3; ++i)
     scatter.mean[i] = sums.q[i] * inverse;
   for (int i = 0; i < 3; ++i)
@@ -582,19 +569,18 @@ SurfaceFit
 fitSurface(kernel::Model model,
            const PointBatch& batch,
            const Scatter& scatter,
-           const FitOptions& options,
-           NullSpace& null_space)
+           const FitOptions& options)
 {
   const SurfaceProblem problem{model, options.residual, kernelPoints(batch), scatter};
   const UnboundedSurface start =
       surfaceStart(model, options.residual, problem.points, scatter);
   if (isThick(model, scatter))
-    return fitThick(problem, options, start, null_space);
+    return fitThick(problem, options, start);
   SurfaceFit fit;
   fit.surface = start;
   if (options.residual == Residual::Ray && model != Model::Plane)
     fit.iterations = approach(problem, options, fit.surface);
-  descend(problem, options, fit, null_space);
+  descend(problem, options, fit);
   return fit;
 }
 

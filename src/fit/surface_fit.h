@@ -68,6 +68,8 @@ struct SurfaceFit {
   int polish_steps = 0;
   ThetaMatrix JtJ = ThetaMatrix::Identity(); ///< Gauss-Newton part of the Hessian
   Linearization linearization;
+  /// Undetermined directions of theta; no column unless Degenerate.
+  NullSpace null_space = NullSpace(6, 0);
 };
 
 /// Moments and principal axes of a padded batch.
@@ -96,12 +98,10 @@ Eigen::Matrix<double, 3, 6> normalJacobian(const Eigen::Matrix3d& C,
 
 /// Weighted fit of one surface: closed-form start, Levenberg-Marquardt, exact Newton
 /// steps at the end, and the linearization there.
-/// \param null_space receives the undetermined directions of theta when Degenerate.
 SurfaceFit fitSurface(kernel::Model model,
                       const PointBatch& batch,
                       const Scatter& scatter,
-                      const FitOptions& options,
-                      NullSpace& null_space);
+                      const FitOptions& options);
 
 /// Inverse of a positive definite matrix.
 ThetaMatrix symmetricInverse(const ThetaMatrix& H);

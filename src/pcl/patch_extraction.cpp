@@ -250,15 +250,15 @@ sortOut(std::vector<ExtractedPatch> attempts,
         bool keep_failures,
         ExtractionResult& result)
 {
-  for (ExtractedPatch& patch : attempts) {
-    const bool accepted = isAccepted(patch);
-    if (!accepted && isUsable(patch.fit.status))
-      ++result.turned_down[patch.validation->verdict];
-    else if (!accepted)
+  for (const ExtractedPatch& patch : attempts) {
+    if (!isUsable(patch.fit.status))
       ++result.rejected[patch.fit.status];
-    if (accepted || keep_failures)
-      result.patches.push_back(std::move(patch));
+    else if (!isAccepted(patch))
+      ++result.turned_down[patch.validation->verdict];
   }
+  // In place: a patch with its covariance is some kilobytes.
+  result.patches =
+      keep_failures ? std::move(attempts) : acceptedAmong(std::move(attempts));
 }
 
 /// What is known before the first fit.

@@ -1,4 +1,6 @@
 #include "second_order.h"
+
+#include "geometry/symmetric.h"
 #include <holdfast/geometry/gaussian.h>
 #include <holdfast/geometry/rotation.h>
 
@@ -17,8 +19,7 @@ Scatter
 movedScatter(const Scatter& scatter, const Eigen::Matrix3d& R, const Joint& x)
 {
   const Eigen::Matrix<double, 6, 1> s = x.segment<6>(JointLayout::kScatter);
-  Eigen::Matrix3d dC;
-  dC << s[0], s[1], s[2], s[1], s[3], s[4], s[2], s[4], s[5];
+  const Eigen::Matrix3d dC = symmetric::matrixOf(s);
   const Eigen::Vector3d mean = scatter.mean + R * x.segment<3>(JointLayout::kMean);
   return withMoments(scatter, mean, scatter.covariance + R * dC * R.transpose());
 }
@@ -45,11 +46,11 @@ public:
       step.head<3>() = x.tail<3>();
       plane = retractedSurface(fit_.plane.surface, scatter, step);
     }
-    const BoundedPatch bounded = fitter_.bound(reference_.type,
-                                               moved,
-                                               scatter,
-                                               fit_.has_plane_stage ? &plane : nullptr,
-                                               origin_);
+    const BoundedPatch bounded = fitter_.bound({reference_.type,
+                                                moved,
+                                                scatter,
+                                                fit_.has_plane_stage ? &plane : nullptr,
+                                                origin_});
     return pack(nearestRepresentation(bounded.patch, reference_));
   }
 

@@ -1,5 +1,6 @@
 #include "stagewise.h"
 
+#include "geometry/symmetric.h"
 #include "uncertainty/stagewise_stages.h"
 
 #include <Eigen/Cholesky>
@@ -108,10 +109,8 @@ private:
       const Estimate<5> fitted = plane(fit_.plane);
       return {fitted.mean.head<2>(), fitted.covariance.topLeftCorner<2, 2>()};
     }
-    const Eigen::Matrix3d& C = axes_.scatter.covariance;
-    Estimate<6> entries;
-    entries.mean << C(0, 0), C(0, 1), C(0, 2), C(1, 1), C(1, 2), C(2, 2);
-    entries.covariance = fit_.surface.linearization.DD.bottomRightCorner<6, 6>();
+    const Estimate<6> entries{symmetric::entriesOf(axes_.scatter.covariance),
+                              fit_.surface.linearization.DD.bottomRightCorner<6, 6>()};
     return propagated(
         [&](const Vec<6>& x) { return principalNormal(axes_.scatter.normal(), x); },
         entries);

@@ -1,0 +1,38 @@
+// Symmetric 3x3 matrices as six numbers, xx xy xz yy yz zz: the order of the sums of
+// the fit, of its moments and of their Jacobians.
+#pragma once
+
+#include <Eigen/Core>
+
+namespace holdfast { namespace symmetric {
+
+inline constexpr int kSize = 6;
+
+// Row and column of entry e; row <= column.
+inline constexpr int kRow[kSize] = {0, 0, 0, 1, 1, 2};
+inline constexpr int kColumn[kSize] = {0, 1, 2, 1, 2, 2};
+
+// Entry at (row, column).
+inline constexpr int kIndex[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+
+inline Eigen::Matrix<double, kSize, 1>
+entriesOf(const Eigen::Matrix3d& matrix)
+{
+  Eigen::Matrix<double, kSize, 1> entries;
+  for (int e = 0; e < kSize; ++e)
+    entries[e] = matrix(kRow[e], kColumn[e]);
+  return entries;
+}
+
+template <typename Entries>
+Eigen::Matrix3d
+matrixOf(const Entries& entries)
+{
+  Eigen::Matrix3d matrix;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      matrix(i, j) = entries[kIndex[i][j]];
+  return matrix;
+}
+
+}} // namespace holdfast::symmetric
