@@ -13,9 +13,9 @@ BEGIN {
   allowed["ground"] = ""
   allowed["geometry"] = ""
   allowed["parallel"] = "ground"
-  allowed["patch"] = "geometry"
+  allowed["patch"] = "ground geometry"
   allowed["sensor"] = "ground geometry"
-  allowed["fit"] = "geometry patch"
+  allowed["fit"] = "ground geometry patch"
   uncertainty = "ground geometry parallel patch fit"
   allowed["uncertainty"] = uncertainty
   allowed["front"] = uncertainty " uncertainty"
@@ -26,6 +26,8 @@ BEGIN {
   allowed["io"] = allowed["pcl"] " pcl"
   # Headers above the rooms: the front door, and what all may know.
   room["patch_estimator"] = "front"
+  room["enum_names"] = "ground"
+  room["noise_pattern"] = "ground"
   room["progress"] = "ground"
   room["version"] = "ground"
   # Beside C++ standard headers, which have neither slash nor dot. What a public header
