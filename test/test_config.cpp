@@ -162,6 +162,111 @@ TEST_F(SensorFile, ErrorsNameLineAndKey)
   }
 }
 
+TEST_F(SensorFile, APatternArrives)
+{
+  write(kGood + "  pattern:\n"
+                "    - {sigma_px: 0.12, length_px: 1.5, shape: exponential}\n"
+                "    - sigma_px: 0.16\n"
+                "      length_px: 40\n"
+                "      shape: gaussian\n");
+  const NoisePattern pattern = loadSensor(file_).pattern;
+  ASSERT_EQ(pattern.waves.size(), 2u);
+  EXPECT_EQ(pattern.waves[0].sigma, 0.12);
+  EXPECT_EQ(pattern.waves[0].length_px, 1.5);
+  EXPECT_EQ(pattern.waves[0].shape, PatternShape::Exponential);
+  EXPECT_EQ(pattern.waves[1].sigma, 0.16) << "0.12^2 + 0.16^2 = 0.2^2 is just allowed";
+  EXPECT_EQ(pattern.waves[1].length_px, 40.0);
+  EXPECT_EQ(pattern.waves[1].shape, PatternShape::Gaussian);
+  write(kGood);
+  EXPECT_TRUE(loadSensor(file_).pattern.empty());
+  write(kGood + "  pattern: []\n");
+  EXPECT_TRUE(loadSensor(file_).pattern.empty());
+}
+
+TEST_F(SensorFile, ErrorsOfAPatternNameLineAndKey)
+{
+  const std::string good = "{sigma_px: 0.1, length_px: 2, shape: gaussian}";
+  struct Case {
+    std::string value, message;
+  };
+  const std::vector<Case> cases{
+      {" 0.1\n", "20: noise.pattern must be a list"},
+      {" " + good + "\n", "20: noise.pattern must be a list"},
+      {"\n", "20: noise.pattern must be a list"},
+      {"\n    - 0.1\n", "21: noise.pattern[0] must be a list of `key: value`"},
+      {"\n    - " + good + "\n    - {sigma_px: -0.1, length_px: 2, shape: gaussian}\n",
+       "22: noise.pattern[1].sigma_px must be >= 0"},
+      {"\n    - {sigma_px: 0.1, length_px: 0, shape: gaussian}\n",
+       "21: noise.pattern[0].length_px must be > 0"},
+      {"\n    - {sigma_px: 0.1, length_px: .inf, shape: gaussian}\n",
+       "21: noise.pattern[0].length_px must be a finite number"},
+      {"\n    - sigma_px: 0.1\n      length_px: 2\n      shape: round\n",
+       "23: noise.pattern[0].shape must be exponential or gaussian, not round"},
+      {"\n    - {sigma_px: 0.1, length_px: 2}\n",
+       "21: noise.pattern[0].shape is missing"},
+      {"\n    - {sigma_px: 0.1, length_px: 2, shape: gaussian, phase: 1}\n",
+       "21: noise.pattern[0].phase is not a known key"},
+      {"\n    - {sigma_m: 0.1, length_px: 2, shape: gaussian}\n",
+       "21: noise.pattern[0].sigma_px is missing"},
+      {"\n    - " + good + "\n    - {sigma_px: 0.2, length_px: 9, shape: gaussian}\n",
+       "20: noise.pattern has a sigma of 0.2236 in all, more than the 0.2 of a single "
+       "point, of which it is a part"},
+  };
+  for (const Case& c : cases) {
+    SCOPED_TRACE(c.value);
+    write(kGood + "  pattern:" + c.value);
+    EXPECT_EQ(complaint(), c.message);
+  }
+}
+
+TEST_F(SensorFile, APatternOfAnotherModelIsInMetresAtOneMetre)
+{
+  const auto withSigma = [](const std::string& sigma) {
+    std::string text = kGood.substr(0, kGood.find("noise:"));
+    return text +
+           "noise:\n  model: linear\n  sigma_m: 0.001\n  sigma_per_m: 0.002\n"
+           "  sigma_lateral_rad: 0.001\n  pattern:\n    - {sigma_m: " +
+           sigma + ", length_px: 2, shape: gaussian}\n";
+  };
+  write(withSigma("0.0029"));
+  ASSERT_EQ(loadSensor(file_).pattern.waves.size(), 1u);
+  EXPECT_EQ(loadSensor(file_).pattern.waves[0].sigma, 0.0029);
+  write(withSigma("0.0031"));
+  EXPECT_EQ(complaint().rfind("21: noise.pattern has a sigma of 0.0031 in all", 0), 0u)
+      << complaint();
+}
+
+TEST_F(SensorFile, ASavedPatternComesBackToTheLastDigit)
+{
+  write(kGood);
+  Sensor sensor = loadSensor(file_);
+  sensor.pattern.waves = {{0.1 / 3.0, 1.0 / 3.0, PatternShape::Exponential},
+                          {0.1, 100.0 / 7.0, PatternShape::Gaussian}};
+  NoiseParameters noise{{"sigma_point_px", 0.3},
+                        {"sigma_disparity_px", 0.2},
+                        {"baseline_m", 0.06},
+                        {"focal_px", 310.0}};
+  saveSensor(file_, sensor, noise, {{"noise.pattern", "Measured."}});
+  const NoisePattern back = loadSensor(file_).pattern;
+  ASSERT_EQ(back.waves.size(), 2u);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(back.waves[i].sigma, sensor.pattern.waves[i].sigma);
+    EXPECT_EQ(back.waves[i].length_px, sensor.pattern.waves[i].length_px);
+    EXPECT_EQ(back.waves[i].shape, sensor.pattern.waves[i].shape);
+  }
+  noise["sigma_disparity_px"] = 0.1;
+  EXPECT_THROW(saveSensor(file_, sensor, noise), std::invalid_argument)
+      << "more than the noise of a point";
+  noise["sigma_disparity_px"] = 0.2;
+  sensor.pattern.waves[0].length_px = 0.0;
+  EXPECT_THROW(saveSensor(file_, sensor, noise), std::invalid_argument);
+
+  sensor.pattern.waves = {{0.001, 3.0, PatternShape::Gaussian}};
+  sensor.noise = makeNoiseModel("constant", {{"sigma_m", 0.002}});
+  saveSensor(file_, sensor, {{"sigma_m", 0.002}});
+  EXPECT_EQ(loadSensor(file_).pattern.waves.at(0).sigma, 0.001);
+}
+
 TEST_F(SensorFile, SectionsMustBeMaps)
 {
   write("");
@@ -287,6 +392,12 @@ TEST(BuiltInSensors, CarryThePublishedNumbers)
   EXPECT_EQ(kinect.baseline_m, 0.075);
   EXPECT_EQ(kinect.disparity_quantum_px, 0.125);
   EXPECT_EQ(loadSensor("xtion").camera.fx, 525.0);
+  for (const std::string name : {"kinect_v1", "xtion"})
+    EXPECT_NEAR(std::sqrt(0.05 * 0.05 + loadSensor(name).pattern.variance()),
+                0.1435,
+                5e-4)
+        << name << ": measured, with the white part";
+  EXPECT_TRUE(loadSensor("perfect").pattern.empty());
   EXPECT_TRUE(loadSensor("perfect").noise->covariance({1, 1, 3}).isZero(0.0));
   const Sensor d435 = loadSensor("realsense_d435");
   // Half of 848 px at 43.5 degrees, given with one decimal.

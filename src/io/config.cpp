@@ -1,8 +1,10 @@
 #include "one_line.h"
 #include <holdfast/io/atomic_file.h>
 #include <holdfast/io/config.h>
+#include <holdfast/sensor/names.h>
 #include <holdfast/sensor/noise_registry.h>
 #include <holdfast/sensor/parameter_error.h>
+#include <holdfast/sensor/stereo_noise_model.h>
 
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
@@ -20,6 +22,7 @@
 #include <string_view>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 namespace holdfast {
 
@@ -119,6 +122,22 @@ public:
     return Section(entry.value, file_, entry.line, fullName(name));
   }
 
+  /// The maps of a list, named `name[0]` and so on.
+  std::vector<Section> list(const std::string& name)
+  {
+    const Entry& entry = read(name);
+    if (!entry.value.IsSequence())
+      fail(name, "must be a list");
+    std::vector<Section> sections;
+    for (const YAML::Node& item : entry.value)
+      sections.push_back(
+          Section(item,
+                  file_,
+                  lineOf(item.Mark()),
+                  fullName(name) + fmt::format("[{}]", sections.size())));
+    return sections;
+  }
+
   /// To be called once all keys were read.
   void rejectUnknown() const
   {
@@ -210,9 +229,72 @@ readDisparity(Section section, Sensor& sensor)
   section.rejectUnknown();
 }
 
+/// The unit of a pattern's sigmas is part of their name.
+std::string
+patternSigmaName(const NoiseModel& noise)
+{
+  return noise.name() == "stereo" ? "sigma_px" : "sigma_m";
+}
+
+PatternWave
+readWave(Section section, const NoiseModel& noise)
+{
+  PatternWave wave;
+  const std::string sigma = patternSigmaName(noise);
+  wave.sigma = section.number(sigma);
+  if (wave.sigma < 0.0)
+    section.fail(sigma, "must be >= 0");
+  wave.length_px = section.positive("length_px");
+  const std::string shape = section.text("shape");
+  const auto found = kPatternShapeNames.find(shape);
+  if (!found)
+    section.fail("shape", "must be exponential or gaussian, not " + io::oneLine(shape));
+  wave.shape = *found;
+  section.rejectUnknown();
+  return wave;
+}
+
+/// Of a single point, in the unit of the pattern's sigmas.
+double
+singlePointVariance(const NoiseModel& noise)
+{
+  if (const auto* stereo = dynamic_cast<const StereoNoiseModel*>(&noise))
+    return stereo->parameters().sigma_disparity_px *
+           stereo->parameters().sigma_disparity_px;
+  return noise.covariance(Eigen::Vector3d::UnitZ())(2, 2);
+}
+
+/// Empty for a pattern that the noise has room for.
+std::string
+excessOf(const NoisePattern& pattern, const NoiseModel& noise)
+{
+  // Sigmas read from decimals add up to that of a point but for their last digits.
+  constexpr double kSlack = 1.0 + 1e-9;
+  const double variance = pattern.variance(), whole = singlePointVariance(noise);
+  if (variance <= kSlack * whole)
+    return "";
+  return fmt::format("has a sigma of {:.4g} in all, more than the {:.4g} of a single "
+                     "point, of which it is a part",
+                     std::sqrt(variance),
+                     std::sqrt(whole));
+}
+
+NoisePattern
+readPattern(Section& section, const NoiseModel& noise)
+{
+  NoisePattern pattern;
+  if (!section.has("pattern"))
+    return pattern;
+  for (const Section& item : section.list("pattern"))
+    pattern.waves.push_back(readWave(item, noise));
+  if (const std::string excess = excessOf(pattern, noise); !excess.empty())
+    section.fail("pattern", excess);
+  return pattern;
+}
+
 /// \param shared values that the model may take from elsewhere in the file.
 NoiseModel::ConstPtr
-readNoise(Section section, const NoiseParameters& shared)
+readNoiseModel(Section& section, const NoiseParameters& shared)
 {
   const std::string model = section.text("model");
   const NoiseModelKind* kind = findNoiseModelKind(model);
@@ -226,13 +308,20 @@ readNoise(Section section, const NoiseParameters& shared)
     else if (section.has(name) || parameter.required)
       parameters[name] = section.number(name);
   }
-  section.rejectUnknown();
   try {
     return makeNoiseModel(model, parameters);
   }
   catch (const ParameterError& error) {
     section.fail(error.parameter(), error.problem());
   }
+}
+
+void
+readNoise(Section section, const NoiseParameters& shared, Sensor& sensor)
+{
+  sensor.noise = readNoiseModel(section, shared);
+  sensor.pattern = readPattern(section, *sensor.noise);
+  section.rejectUnknown();
 }
 
 Sensor
@@ -249,7 +338,7 @@ readSensor(const YAML::Node& node, const std::string& file)
     shared = {{"baseline_m", sensor.baseline_m},
               {"focal_px", sensor.disparity_focal_px}};
   }
-  sensor.noise = readNoise(root.section("noise"), shared);
+  readNoise(root.section("noise"), shared, sensor);
   root.rejectUnknown();
   return sensor;
 }
@@ -281,6 +370,15 @@ public:
   void entry(const std::string& key, double value)
   {
     entry(key, fmt::format("{}", value)); // as few digits as read back the same
+  }
+
+  /// Below the entry, one in each line, in the short form of YAML.
+  void list(const std::string& key, const std::vector<std::string>& maps)
+  {
+    writeComment(section_ + key, "  ");
+    out_ << "  " << key << ":\n";
+    for (const std::string& map : maps)
+      out_ << "    - {" << map << "}\n";
   }
 
   /// \throw std::invalid_argument when a comment was left over.
@@ -325,6 +423,20 @@ yamlText(const std::string& word)
 }
 
 void
+writePattern(SectionWriter& out, const Sensor& sensor)
+{
+  std::vector<std::string> maps;
+  for (const PatternWave& wave : sensor.pattern.waves)
+    maps.push_back(fmt::format("{}: {}, length_px: {}, shape: {}",
+                               patternSigmaName(*sensor.noise),
+                               wave.sigma,
+                               wave.length_px,
+                               kPatternShapeNames.of(wave.shape)));
+  if (!maps.empty())
+    out.list("pattern", maps);
+}
+
+void
 writeSensor(SectionWriter& out, const Sensor& sensor, const NoiseParameters& noise)
 {
   out.entry("name", yamlText(sensor.name));
@@ -347,6 +459,7 @@ writeSensor(SectionWriter& out, const Sensor& sensor, const NoiseParameters& noi
   out.entry("model", sensor.noise->name());
   for (const auto& [name, value] : noise)
     out.entry(name, value);
+  writePattern(out, sensor);
   out.finish();
 }
 
@@ -409,7 +522,12 @@ saveSensor(const std::string& path,
            const NoiseParameters& noise,
            const SensorComments& comments)
 {
-  makeNoiseModel(sensor.noise->name(), noise); // throws when they do not match
+  const NoiseModel::ConstPtr model = // throws when they do not match
+      makeNoiseModel(sensor.noise->name(), noise);
+  if (const std::string error = validityError(sensor.pattern); !error.empty())
+    throw std::invalid_argument(error);
+  if (const std::string excess = excessOf(sensor.pattern, *model); !excess.empty())
+    throw std::invalid_argument("pattern " + excess);
   AtomicFile file(path);
   SectionWriter out(file.stream(), comments);
   writeSensor(out, sensor, noise);

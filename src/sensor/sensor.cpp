@@ -16,6 +16,7 @@ withConstantNoise(Sensor sensor, double sigma_m)
   name.imbue(std::locale::classic());
   name << "constant noise of " << 1e3 * sigma_m << " mm";
   sensor.name = name.str();
+  sensor.pattern = {}; // it belongs to the camera that this replaces
   sensor.noise = std::make_shared<const ConstantNoiseModel>(
       ConstantNoiseModel::Parameters{sigma_m, sigma_m});
   return sensor;

@@ -28,8 +28,8 @@ using SensorComments = std::map<std::string, std::string>;
 /// Writes a file from which loadSensor() makes the same sensor, to the last digit.
 ///
 /// \param noise the parameters that sensor.noise was made from, which it does not tell.
-/// \throw std::invalid_argument when they do not suit its model, or a comment has no
-/// key to stand above.
+/// \throw std::invalid_argument when they do not suit its model, the pattern makes no
+/// sense or is more than the noise of a point, or a comment has no key to stand above.
 /// \throw std::runtime_error when the file cannot be written; then there is none, or
 /// the one from before.
 void saveSensor(const std::string& path,

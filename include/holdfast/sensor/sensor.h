@@ -1,6 +1,7 @@
 /// \file A depth sensor: its camera and the noise of its measurements.
 #pragma once
 
+#include <holdfast/noise_pattern.h>
 #include <holdfast/sensor/camera.h>
 #include <holdfast/sensor/noise_model.h>
 
@@ -12,6 +13,8 @@ struct Sensor {
   std::string name;
   Camera camera;
   NoiseModel::ConstPtr noise; ///< never null in a loaded sensor
+  /// The part of that noise which neighbouring pixels share.
+  NoisePattern pattern;
   /// Depth range the sensor delivers, m.
   double min_range_m = 0.0;
   double max_range_m = 1e3;
