@@ -200,6 +200,18 @@ addSensorOption(CLI::App& command, std::string& name)
 }
 
 void
+addNoPatternOption(CLI::App& command, bool& no_pattern)
+{
+  command
+      .add_flag("--no-pattern",
+                no_pattern,
+                "Take the errors of neighbouring pixels as independent, whatever the "
+                "sensor file says: as the paper does, and on a real camera too sure by "
+                "a factor of 3 to 20")
+      ->group("Input");
+}
+
+void
 addSensorOptions(CLI::App& command, InputOptions& options)
 {
   addSensorOption(command, options.sensor_name);
@@ -229,10 +241,7 @@ loadSensorOption(const std::string& name)
 Sensor
 sensorOf(const CloudFileInfo& info, const Sensor& nominal)
 {
-  Sensor sensor = nominal;
-  if (info.camera)
-    sensor.camera = *info.camera;
-  return sensor;
+  return info.camera ? withCamera(nominal, *info.camera) : nominal;
 }
 
 LoadOptions

@@ -39,6 +39,9 @@ void addSensorOptions(CLI::App& command, InputOptions& options);
 /// Adds --sensor alone. `name` must outlive the parsing.
 void addSensorOption(CLI::App& command, std::string& name);
 
+/// Adds --no-pattern. `no_pattern` must outlive the parsing.
+void addNoPatternOption(CLI::App& command, bool& no_pattern);
+
 /// \throw CLI::ValidationError when there is no such sensor.
 Sensor loadSensorOption(const std::string& name);
 

@@ -15,8 +15,8 @@ NoisePattern::covariance(double distance_px) const
 {
   double sum = 0.0;
   for (const PatternWave& wave : waves)
-    sum += wave.sigma * wave.sigma *
-           correlation(wave.shape, distance_px / wave.length_px);
+    sum +=
+        wave.sigma * wave.sigma * correlation(wave.shape, distance_px / wave.length_px);
   return sum;
 }
 

@@ -32,6 +32,7 @@ PatchEstimator::estimate(PointBatch& batch) const
   if (fit.status == FitStatus::Converged) {
     const PatchCovariance uncertainty =
         patchCovariance(fit, batch, impl_->fitter, impl_->mode);
+    result.chi2_expected = expectedChi2(fit);
     result.covariance = uncertainty.covariance;
     result.mean_shift = uncertainty.mean_shift;
     result.status = observability(fit, result.covariance);

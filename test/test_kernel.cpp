@@ -789,7 +789,7 @@ TEST_P(FittedSurface, HasZeroGradientAndTheHessianOfTheCost)
   FitOptions options;
   options.residual = residual;
   options.polish_tolerance_sigma = 1e-11;
-  const SurfaceFit fit = fitSurface(model, p.batch, p.scatter, options);
+  const SurfaceFit fit = fitSurface(model, p.batch, p.scatter, {}, options);
   ASSERT_EQ(fit.status, FitStatus::Converged);
   p.surface = fit.surface;
   p.enterFrame();

@@ -198,7 +198,8 @@ int
 runFit(const CLI::App& command, FitSettings& settings)
 {
   finishExtractionOptions(command, settings.extraction);
-  const Sensor sensor = loadSensorOption(settings.input.sensor_name);
+  const Sensor named = loadSensorOption(settings.input.sensor_name);
+  const Sensor sensor = settings.no_pattern ? withoutPattern(named) : named;
   Output output(settings);
   const int exit_code =
       forEachCloud(settings.input.clouds, [&](const std::string& path) {

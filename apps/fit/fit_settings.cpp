@@ -22,6 +22,7 @@ addSurveyOptions(CLI::App& command, FitSettings& settings)
       ->check(positiveNumber("M"))
       ->type_name("")
       ->group("Input");
+  addNoPatternOption(command, settings.no_pattern);
   addChoice(command,
             "--orient",
             settings.extraction.options.normal_side,

@@ -12,6 +12,7 @@ namespace holdfast::app {
 struct FitSettings {
   InputOptions input;
   double sigma_m = 0.0; ///< 0: the noise of the sensor
+  bool no_pattern = false;
   bool whole = false;
   ExtractionSettings extraction;
   std::string output_folder; ///< empty: no files

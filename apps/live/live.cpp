@@ -49,6 +49,7 @@ constexpr double kDefaultBudgetMs = 25.0;
 struct LiveSettings {
   Openni2Options device;
   std::string sensor_name = "kinect_v1";
+  bool no_pattern = false;
   ExtractionSettings extraction;
   double budget_ms = kDefaultBudgetMs;
   RunOptions run;
@@ -132,16 +133,16 @@ private:
 };
 
 Sensor
-withCamera(Sensor sensor, const Camera& camera)
+sensorOf(const LiveSettings& settings)
 {
-  sensor.camera = camera;
-  return sensor;
+  const Sensor sensor = loadSensorOption(settings.sensor_name);
+  return settings.no_pattern ? withoutPattern(sensor) : sensor;
 }
 
 LiveSession::LiveSession(const LiveSettings& settings, Openni2Grabber& grabber)
 : settings_(settings)
 , grabber_(grabber)
-, sensor_(withCamera(loadSensorOption(settings.sensor_name), grabber.camera()))
+, sensor_(withCamera(sensorOf(settings), grabber.camera()))
 , extractor_(sensor_, settings.extraction.options)
 {
   if (!settings.output_folder.empty())
@@ -222,6 +223,7 @@ addLiveOptions(CLI::App& command, LiveSettings& settings)
 {
   addDeviceOptions(command, settings.device);
   addSensorOption(command, settings.sensor_name);
+  addNoPatternOption(command, settings.no_pattern);
   addExtractionOptions(command, settings.extraction);
   SamplerOptions& sampler = settings.extraction.options.sampler;
   sampler.max_patches = kDefaultPatches;

@@ -115,6 +115,8 @@ PatchFitter::fit(PointBatch& batch) const
   if (fit.points < kernel::parameterCount(model))
     return fit;
   batch.pad();
+  if (batch.pattern() != nullptr)
+    fit.support = PatternSupport(batch);
 
   // Stage I-1 (i): principal axes.
   fit.scatter = measureScatter(batch,
@@ -129,14 +131,14 @@ PatchFitter::fit(PointBatch& batch) const
   fit.has_plane_stage =
       !options_.normal_from_pca && (model == Model::Sphere || model == Model::Cylinder);
   if (fit.has_plane_stage) {
-    fit.plane = fitSurface(Model::Plane, batch, fit.scatter, options_);
+    fit.plane = fitSurface(Model::Plane, batch, fit.scatter, fit.support, options_);
     fit.status = fit.plane.status;
     fit.null_space = fit.plane.null_space;
     if (fit.status != FitStatus::Converged)
       return fit;
   }
   // Stage I-2 (for planes: I-1's refit).
-  fit.surface = fitSurface(model, batch, fit.scatter, options_);
+  fit.surface = fitSurface(model, batch, fit.scatter, fit.support, options_);
   fit.status = fit.surface.status;
   fit.null_space = fit.surface.null_space;
   if (fit.status != FitStatus::Converged && fit.status != FitStatus::IterationLimit)

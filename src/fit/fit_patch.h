@@ -12,6 +12,7 @@ namespace holdfast {
 /// A fitted patch with everything its covariance is computed from.
 struct PatchFit {
   FitStatus status = FitStatus::TooFewPoints;
+  PatternSupport support; ///< measured where the batch has a pattern
   Scatter scatter;
   SurfaceFit surface;
   /// Stage I-1 as a weighted plane, when sphere or cylinder take their normal from it.

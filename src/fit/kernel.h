@@ -80,10 +80,18 @@ packed(int row, int column, int n)
   return row * n - row * (row - 1) / 2 + column - row;
 }
 
+/// What accumulateCovariance() needs of errors that points share (fit/pattern.h).
+struct PatternPoints {
+  const double* direction[3]; ///< r_i, how point i moves with its shared error
+  const double* extra; ///< variance along r_i that the sums count beside Sigma_i
+  double* response; ///< out: X_i r_i, kMaxTheta rows of padded_size
+};
+
 /// Where the points are: channels in the order of PointBatch::Channel.
 struct Points {
   const double* channel[10];
   int padded_size; ///< multiple of PointBatch::kLaneMultiple
+  const PatternPoints* pattern = nullptr; ///< null: all errors are independent
 };
 
 /// Surface at which the sums are taken; coordinates relative to the batch's origin.
@@ -121,7 +129,9 @@ struct NormalSums {
 };
 
 /// Sums of the exact covariance. X_i = d^2E / dtheta dq_i is p x 3, in the local frame;
-/// symmetric index pairs in the order xx xy xz yy yz zz; qt = q - centroid.
+/// symmetric index pairs in the order xx xy xz yy yz zz; qt = q - centroid. Where
+/// points share errors, Sigma_i stands for Sigma_i + extra_i r_i r_i^T; the cost and
+/// its derivatives know nothing of it.
 struct CovarianceSums {
   double cost;
   double gradient[kMaxTheta];

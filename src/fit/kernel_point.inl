@@ -741,14 +741,41 @@ addMoments(int e, const Tile<p>& tile, CovarianceAccumulators<p, shape>& sums)
     sums.qqS[pair][e] = qqS[pair];
 }
 
+// Responses to what the points share, and the noise with what is extra. After the
+// Hessian, which is that of the weights.
+template <int p>
+HOLDFAST_INLINE void
+sharePattern(const Points& points, const State& state, int first, Tile<p>& tile)
+{
+  const PatternPoints& pattern = *points.pattern;
+  for (int i = 0; i < tile.size; ++i) {
+    const int at = first + i * kLanes;
+    Number r[3], outside[3];
+    HOLDFAST_UNROLLED_FOR (int k = 0; k < 3; ++k)
+      outside[k] = load(pattern.direction[k] + at);
+    rotateIntoFrame(state.R, outside, r);
+    HOLDFAST_UNROLLED_FOR (int a = 0; a < p; ++a)
+      store(dot(tile.X[i][a], r), pattern.response + a * points.padded_size + at);
+    const Number extra = load(pattern.extra + at);
+    Number* S = tile.point[i].noise.S;
+    HOLDFAST_UNROLLED_FOR (int b = 0, pair = 0; b < 3; ++b)
+      HOLDFAST_UNROLLED_FOR (int c = b; c < 3; ++c, ++pair)
+        S[pair] = S[pair] + extra * r[b] * r[c];
+  }
+}
+
 template <typename ResidualPolicy, typename Surface, int p, int shape, int... a>
 HOLDFAST_INLINE void
 addTile(const Surface& surface,
+        const Points& points,
+        int first,
         Tile<p>& tile,
         CovarianceAccumulators<p, shape>& sums,
         std::integer_sequence<int, a...>)
 {
   (addHessianRow<a, ResidualPolicy>(surface, tile, sums), ...);
+  if (points.pattern != nullptr)
+    sharePattern(points, surface.s, first, tile);
   (addCrossRow<a>(tile, sums), ...);
   for (int e = 0; e < 6; ++e)
     addMoments(e, tile, sums);
@@ -779,7 +806,12 @@ covarianceSums(const Points& points, const State& state, CovarianceSums& out)
       HOLDFAST_UNROLLED_FOR (int k = 0; k < 3; ++k)
         tile.qt[i][k] = point.q[k] - state.centroid[k];
     }
-    addTile<ResidualPolicy>(surface, tile, sums, std::make_integer_sequence<int, p>());
+    addTile<ResidualPolicy>(surface,
+                            points,
+                            first,
+                            tile,
+                            sums,
+                            std::make_integer_sequence<int, p>());
   }
   reduce(sums, out);
   surface.combine(out.L, out.gradient);

@@ -42,6 +42,7 @@ PointBatch::clear(const Eigen::Vector3d& origin, const Eigen::Vector3d& viewpoin
   size_ = 0;
   origin_ = origin;
   setViewpoint(viewpoint);
+  pattern_.reset();
 }
 
 void
@@ -102,9 +103,19 @@ PointBatch::add(const Eigen::Vector3d& point, const Eigen::Matrix3d& covariance)
 namespace {
 
 bool
+hasFinitePattern(const PointBatch& batch, int i)
+{
+  double sum = 0.0;
+  for (int c = PointBatch::U; c <= PointBatch::EZ; ++c)
+    sum += batch.channel(static_cast<PointBatch::Channel>(c))[i];
+  return std::isfinite(sum);
+}
+
+bool
 isValid(const PointBatch& batch, int i)
 {
-  return (batch.point(i) - batch.origin()).allFinite() &&
+  return (batch.pattern() == nullptr || hasFinitePattern(batch, i)) &&
+         (batch.point(i) - batch.origin()).allFinite() &&
          isPositiveSemiDefinite(batch.covariance(i));
 }
 
@@ -146,7 +157,10 @@ int
 PointBatch::removeInvalid()
 {
   pad();
-  const int start = std::min(size_, kernel::countLeadingValid(kernelPoints(*this)));
+  int start = std::min(size_, kernel::countLeadingValid(kernelPoints(*this)));
+  for (int i = 0; i < start && pattern_; ++i)
+    if (!hasFinitePattern(*this, i))
+      start = i;
   int kept = start;
   for (int i = start; i < size_; ++i) {
     if (!isValid(*this, i))
@@ -213,6 +227,8 @@ PointBatch::pad()
     // Copies of a point stay within range of the surface; no covariance, no weight.
     std::fill(values + size_, values + padded, c < SXX ? values[size_ - 1] : 0.0);
   }
+  for (int c = EX; c <= EXTRA && pattern_; ++c)
+    std::fill_n(channel(static_cast<Channel>(c)) + size_, padded - size_, 0.0);
 }
 
 int

@@ -65,7 +65,8 @@ centreSigma(const FitResult& fit, const Eigen::Vector3d& direction)
 double
 chi2PerDof(const FitResult& fit)
 {
-  return fit.chi2_dof > 0 ? fit.chi2 / fit.chi2_dof : 0.0;
+  const double expected = fit.chi2_expected > 0.0 ? fit.chi2_expected : fit.chi2_dof;
+  return fit.chi2_dof > 0 && expected > 0.0 ? fit.chi2 / expected : 0.0;
 }
 
 } // namespace holdfast

@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace holdfast {
 namespace {
@@ -95,6 +96,8 @@ struct SurfaceProblem {
   Residual residual;
   kernel::Points points;
   const Scatter& scatter;
+  const PointBatch& batch;
+  const PatternSupport& support;
 
   void evaluate(const State& state, Evaluation& evaluation) const
   {
@@ -314,6 +317,58 @@ statusOf(LevenbergMarquardtSummary::Stop stop)
   return FitStatus::NonFinite;
 }
 
+// The kernel's covariance sums, with what errors that points share need.
+class CovariancePass {
+public:
+  explicit CovariancePass(const SurfaceProblem& problem)
+  : problem_(problem), points_(problem.points)
+  {
+    if (problem.batch.pattern() == nullptr)
+      return;
+    // Kept between patches: no allocation once they have seen the largest.
+    thread_local std::vector<double> response;
+    response.resize(static_cast<std::size_t>(kernel::kMaxTheta * points_.padded_size));
+    const PointBatch& batch = problem.batch;
+    pattern_ = {{batch.channel(PointBatch::EX),
+                 batch.channel(PointBatch::EY),
+                 batch.channel(PointBatch::EZ)},
+                batch.channel(PointBatch::EXTRA),
+                response.data()};
+    // Rows that the model does not have.
+    const int rows = kernel::parameterCount(problem.model);
+    std::fill(response.begin() + rows * points_.padded_size, response.end(), 0.0);
+    points_.pattern = &pattern_;
+  }
+
+  CovariancePass(const CovariancePass&) = delete;
+  CovariancePass& operator=(const CovariancePass&) = delete;
+
+  void run(const UnboundedSurface& surface, kernel::CovarianceSums& sums) const
+  {
+    kernel::kernel().accumulateCovariance(problem_.model,
+                                          problem_.residual,
+                                          points_,
+                                          kernelState(surface, problem_.scatter),
+                                          sums);
+  }
+
+  // After the last run, at the same surface.
+  void addPattern(const UnboundedSurface& surface, Linearization& linearization) const
+  {
+    linearization.has_pattern = points_.pattern != nullptr;
+    if (linearization.has_pattern)
+      linearization.pattern = problem_.support.sum(problem_.batch,
+                                                   problem_.scatter,
+                                                   surface.R,
+                                                   pattern_.response);
+  }
+
+private:
+  const SurfaceProblem& problem_;
+  kernel::Points points_;
+  kernel::PatternPoints pattern_{};
+};
+
 // Exact Newton steps; the sums of the last one also give the covariance. Newton is
 // blind to the cost: where it climbs away from the start, the start is kept.
 void
@@ -323,13 +378,10 @@ polish(const SurfaceProblem& problem, const FitOptions& options, SurfaceFit& fit
   constexpr double kClimb = 0.25;
   const UnboundedSurface start = fit.surface;
   const double start_cost = fit.cost;
+  const CovariancePass pass(problem);
   kernel::CovarianceSums sums;
   for (fit.polish_steps = 1; fit.polish_steps <= kMaxPolishSteps; ++fit.polish_steps) {
-    kernel::kernel().accumulateCovariance(problem.model,
-                                          problem.residual,
-                                          problem.points,
-                                          kernelState(fit.surface, problem.scatter),
-                                          sums);
+    pass.run(fit.surface, sums);
     linearize(fit.surface, problem.scatter, sums, fit.linearization);
     fit.cost = sums.cost;
     if (!fit.linearization.H.allFinite()) {
@@ -346,9 +398,12 @@ polish(const SurfaceProblem& problem, const FitOptions& options, SurfaceFit& fit
     }
     const Theta gradient = gradientOf(problem.model, sums.gradient);
     const Theta step = -cholesky.solve(gradient);
+    const bool arrived =
+        std::sqrt(std::max(0.0, -step.dot(gradient))) < options.polish_tolerance_sigma;
+    if (arrived)
+      pass.addPattern(fit.surface, fit.linearization);
     fit.surface = retractedSurface(fit.surface, problem.scatter, step);
-    if (std::sqrt(std::max(0.0, -step.dot(gradient))) <
-        options.polish_tolerance_sigma) {
+    if (arrived) {
       fit.status = FitStatus::Converged;
       return;
     }
@@ -569,9 +624,15 @@ SurfaceFit
 fitSurface(kernel::Model model,
            const PointBatch& batch,
            const Scatter& scatter,
+           const PatternSupport& support,
            const FitOptions& options)
 {
-  const SurfaceProblem problem{model, options.residual, kernelPoints(batch), scatter};
+  const SurfaceProblem problem{model,
+                               options.residual,
+                               kernelPoints(batch),
+                               scatter,
+                               batch,
+                               support};
   const UnboundedSurface start =
       surfaceStart(model, options.residual, problem.points, scatter);
   if (isThick(model, scatter))
@@ -604,6 +665,14 @@ symmetricInverse(const ThetaMatrix& H)
 }
 
 ThetaMatrix
+patternOfGradient(const Linearization& l)
+{
+  Eigen::Matrix<double, kernel::kMaxTheta, kPatternTerms> J;
+  J << ThetaMatrix::Identity(), l.A;
+  return J * l.pattern * J.transpose();
+}
+
+ThetaMatrix
 thetaCovariance(const Linearization& l, const ThetaMatrix& hessian)
 {
   // lazyProduct: for matrices this small Eigen's blocked product costs more than the
@@ -611,8 +680,10 @@ thetaCovariance(const Linearization& l, const ThetaMatrix& hessian)
   const ThetaByMoments half = l.XD + 0.5 * l.A.lazyProduct(l.DD);
   const ThetaMatrix cross = half.lazyProduct(l.A.transpose());
   const ThetaMatrix inverse = symmetricInverse(hessian);
-  return inverse.lazyProduct(
-      ThetaMatrix((l.XX + cross + cross.transpose()).lazyProduct(inverse)));
+  ThetaMatrix gradient = l.XX + cross + cross.transpose();
+  if (l.has_pattern)
+    gradient += patternOfGradient(l);
+  return inverse.lazyProduct(ThetaMatrix(gradient.lazyProduct(inverse)));
 }
 
 } // namespace holdfast

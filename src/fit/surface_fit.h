@@ -2,6 +2,7 @@
 #pragma once
 
 #include "kernel.h"
+#include "pattern.h"
 #include <holdfast/fit/point_batch.h>
 #include <holdfast/fit/result.h>
 
@@ -48,6 +49,9 @@ struct Linearization {
   ThetaMatrix XX = ThetaMatrix::Zero(); ///< sum X_i Sigma_i X_i^T
   ThetaByMoments XD = ThetaByMoments::Zero(); ///< sum X_i Sigma_i D_i^T
   MomentMatrix DD = MomentMatrix::Zero(); ///< sum D_i Sigma_i D_i^T
+  /// What errors that points share add to XX, XD and DD as one matrix (fit/pattern.h).
+  bool has_pattern = false;
+  PatternMatrix pattern; ///< meaningful when has_pattern
 };
 
 /// An unbounded surface in the solver's terms.
@@ -98,13 +102,19 @@ Eigen::Matrix<double, 3, 6> normalJacobian(const Eigen::Matrix3d& C,
 
 /// Weighted fit of one surface: closed-form start, Levenberg-Marquardt, exact Newton
 /// steps at the end, and the linearization there.
+/// \param support of the batch; used where it has a pattern.
 SurfaceFit fitSurface(kernel::Model model,
                       const PointBatch& batch,
                       const Scatter& scatter,
+                      const PatternSupport& support,
                       const FitOptions& options);
 
 /// Inverse of a positive definite matrix.
 ThetaMatrix symmetricInverse(const ThetaMatrix& H);
+
+/// What errors that points share add to the covariance of the gradient at the estimate,
+/// E_theta + A ds.
+ThetaMatrix patternOfGradient(const Linearization& linearization);
 
 /// First-order covariance of theta, from the Hessian or its Gauss-Newton part.
 ThetaMatrix thetaCovariance(const Linearization& linearization,

@@ -4,6 +4,7 @@
 #include <holdfast/patch/tessellation.h>
 #include <holdfast/pcl/conversions.h>
 #include <holdfast/pcl/names.h>
+#include <holdfast/sensor/names.h>
 #include <holdfast/validation/names.h>
 #include <holdfast/version.h>
 
@@ -65,6 +66,18 @@ noiseName(const PatchReport& report)
                                        "none";
 }
 
+/// In the unit of the model: px of disparity for stereo, m at 1 m for others.
+Json
+patternJson(const NoisePattern& pattern)
+{
+  Json waves = Json::array();
+  for (const PatternWave& wave : pattern.waves)
+    waves.push_back({{"sigma", wave.sigma},
+                     {"length_px", wave.length_px},
+                     {"shape", kPatternShapeNames.of(wave.shape)}});
+  return waves;
+}
+
 Json
 sensorJson(const PatchReport& report)
 {
@@ -73,6 +86,7 @@ sensorJson(const PatchReport& report)
   const Eigen::Vector3d position = report.sensor_pose.c + report.offset;
   return {{"name", sensor.name},
           {"noise", noiseName(report)},
+          {"pattern", patternJson(sensor.pattern)},
           {"camera", cameraJson(sensor.camera)},
           {"position", vectorJson(position)},
           {"orientation_wxyz", {q.w(), q.x(), q.y(), q.z()}},
@@ -200,6 +214,7 @@ patchJson(const ExtractedPatch& extracted, const PatchReport& report)
             {"uninformative_points", fit.uninformative_points},
             {"chi2", fit.chi2},
             {"chi2_dof", fit.chi2_dof},
+            {"chi2_expected", fit.chi2_expected},
             {"iterations", fit.iterations},
             {"residual", Json()},
             {"coverage", Json()},
@@ -313,6 +328,8 @@ patchFromJson(const Json& json)
   fit.uninformative_points = json.value("uninformative_points", 0); // not in old files
   fit.chi2 = number(json.at("chi2"));
   fit.chi2_dof = json.at("chi2_dof");
+  // Not in files of former versions, which knew independent errors only.
+  fit.chi2_expected = json.value("chi2_expected", static_cast<double>(fit.chi2_dof));
   fit.iterations = json.at("iterations");
   if (const Json& seed = json.at("seed"); !seed.is_null()) {
     extracted.seed_index = seed.at("index").get<int>();

@@ -186,6 +186,7 @@ toExtractedPatch(const PatchPoint& point)
     readNumbers(point, type, fit);
   fit.chi2 = point.chi2;
   fit.chi2_dof = point.chi2_dof;
+  fit.chi2_expected = fit.chi2_dof;
   fit.points = point.points;
   if (point.seed >= 0)
     patch.seed_index = point.seed;

@@ -221,17 +221,15 @@ chooseSensorPose(const pcl::PointCloud<pcl::PointXYZ>::ConstPtr& points,
 Sensor
 matchedSensor(const Sensor& sensor, const RangeCloud& cloud, std::string* notice)
 {
-  Sensor matched = sensor;
   const std::optional<double> residual = pixelResidual(cloud, sensor.camera);
   if (!residual || *residual <= kMaxCameraResidualPx)
-    return matched;
+    return sensor;
   const std::optional<Camera> recovered = recoverIntrinsics(cloud);
   if (!recovered)
-    return matched;
-  matched.camera = *recovered;
+    return sensor;
   if (notice != nullptr)
     *notice = describeChange(sensor.camera, *recovered);
-  return matched;
+  return withCamera(sensor, *recovered);
 }
 
 } // namespace holdfast

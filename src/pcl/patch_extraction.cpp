@@ -66,7 +66,7 @@ class PatchMaker {
 public:
   PatchMaker(const PointSelection& chosen, const ExtractionOptions& options)
   : side_(options.normal_side)
-  , gatherer_(chosen.cloud, chosen.sensor.noise, options.fit.noise_at_surface)
+  , gatherer_(chosen.cloud, chosen.sensor, options.fit.noise_at_surface)
   , estimator_(options.fit, options.covariance)
   , validation_(options.validation)
   {

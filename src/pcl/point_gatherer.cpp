@@ -91,6 +91,16 @@ PointGatherer::PointGatherer(const RangeCloud& cloud,
 , stored_(cloud.covariances.empty() ? image_covariances_ : cloud.covariances)
 {}
 
+PointGatherer::PointGatherer(const RangeCloud& cloud,
+                             const Sensor& sensor,
+                             bool noise_at_surface)
+: PointGatherer(cloud, sensor.noise, noise_at_surface)
+{
+  camera_ = sensor.camera;
+  if (!sensor.pattern.empty() && cloud.covariances.empty())
+    pattern_ = std::make_shared<const CorrelatedNoise>(sensor.pattern);
+}
+
 void
 PointGatherer::gather(const std::vector<int>& indices,
                       const Eigen::Vector3d& origin,
@@ -103,6 +113,8 @@ PointGatherer::gather(const std::vector<int>& indices,
     gatherModelled(indices, batch);
   else
     gatherStored(indices, batch);
+  if (pattern_)
+    sharePattern(batch);
   double* x = batch.channel(PointBatch::X);
   double* y = batch.channel(PointBatch::Y);
   double* z = batch.channel(PointBatch::Z);
@@ -117,6 +129,8 @@ PointGatherer::gather(const std::vector<int>& indices,
 void
 PointGatherer::gatherStored(const std::vector<int>& indices, PointBatch& batch) const
 {
+  if (pattern_)
+    copyToCameraFrame(indices, batch);
   const CovarianceChannels s = covarianceChannels(batch);
   for (std::size_t i = 0; i < indices.size(); ++i) {
     const Eigen::Matrix3f& S = stored_[static_cast<std::size_t>(indices[i])];
@@ -129,9 +143,17 @@ PointGatherer::gatherStored(const std::vector<int>& indices, PointBatch& batch) 
   }
 }
 
-/// Leaves the coordinates in the camera frame, where the model wants them.
 void
 PointGatherer::gatherModelled(const std::vector<int>& indices, PointBatch& batch) const
+{
+  copyToCameraFrame(indices, batch);
+  evaluateModel(batch);
+}
+
+/// Leaves the coordinates in the camera frame, where the model wants them.
+void
+PointGatherer::copyToCameraFrame(const std::vector<int>& indices,
+                                 PointBatch& batch) const
 {
   double* x = batch.channel(PointBatch::X);
   double* y = batch.channel(PointBatch::Y);
@@ -149,7 +171,6 @@ PointGatherer::gatherModelled(const std::vector<int>& indices, PointBatch& batch
     y[i] = q.y();
     z[i] = q.z();
   }
-  evaluateModel(batch);
 }
 
 void
@@ -173,6 +194,40 @@ PointGatherer::evaluateModel(PointBatch& batch) const
       s.xx[i] = z[i] > 0.0 ? s.xx[i] : kNoCovariance;
   if (!in_camera_frame_)
     rotate(cloud_.sensor_pose.R, n, s);
+}
+
+/// Pixels of the measured points, and directions at the points the model was asked at.
+void
+PointGatherer::sharePattern(PointBatch& batch) const
+{
+  const int n = batch.size();
+  const double* const measured[3] = {batch.channel(PointBatch::X),
+                                     batch.channel(PointBatch::Y),
+                                     batch.channel(PointBatch::Z)};
+  const double* const reference[3] = {batch.channel(PointBatch::RX),
+                                      batch.channel(PointBatch::RY),
+                                      batch.channel(PointBatch::RZ)};
+  double* const direction[3] = {batch.channel(PointBatch::EX),
+                                batch.channel(PointBatch::EY),
+                                batch.channel(PointBatch::EZ)};
+  double* u = batch.channel(PointBatch::U);
+  double* v = batch.channel(PointBatch::V);
+  for (int i = 0; i < n; ++i) {
+    const double inverse = 1.0 / measured[2][i];
+    u[i] = camera_.fx * measured[0][i] * inverse + camera_.cx;
+    v[i] = camera_.fy * measured[1][i] * inverse + camera_.cy;
+  }
+  const bool at_reference = noise_at_surface_ && stored_.empty();
+  noise_->patternDirections(n, at_reference ? reference : measured, direction);
+  if (!in_camera_frame_)
+    for (int i = 0; i < n; ++i) {
+      const Eigen::Vector3d r =
+          cloud_.sensor_pose.R *
+          Eigen::Vector3d(direction[0][i], direction[1][i], direction[2][i]);
+      for (int k = 0; k < 3; ++k)
+        direction[k][i] = r[k];
+    }
+  batch.setPattern(pattern_);
 }
 
 } // namespace holdfast

@@ -172,7 +172,9 @@ ViewCheck::hint() const
 std::string
 ViewCheck::foreignNotice() const
 {
-  const std::string assumed = "a noise of 1 mm in every direction is assumed";
+  const std::string assumed =
+      std::string("a noise of 1 mm in every direction is assumed") +
+      (sensor_.pattern.empty() ? "" : ", independent from point to point");
   const std::string mistake = likelyMistake();
   if (!mistake.empty())
     return mistake + "; as they are, " + assumed;

@@ -1,5 +1,6 @@
 #include <holdfast/sensor/noise_model.h>
 
+#include <cmath>
 #include <limits>
 #include <stdexcept>
 
@@ -20,6 +21,28 @@ NoiseModel::covariances(int n,
     out.yy[i] = Sigma(1, 1);
     out.yz[i] = Sigma(1, 2);
     out.zz[i] = Sigma(2, 2);
+  }
+}
+
+Eigen::Vector3d
+NoiseModel::patternDirection(const Eigen::Vector3d& q) const
+{
+  const Eigen::Vector3d ray = q.normalized();
+  const double here = ray.dot(covariance(q) * ray);
+  const double at_one_metre = ray.dot(covariance(ray) * ray);
+  return at_one_metre > 0.0 ? Eigen::Vector3d(std::sqrt(here / at_one_metre) * ray) :
+                              Eigen::Vector3d(Eigen::Vector3d::Zero());
+}
+
+void
+NoiseModel::patternDirections(int n,
+                              const double* const point[3],
+                              double* const direction[3]) const
+{
+  for (int i = 0; i < n; ++i) {
+    const Eigen::Vector3d r = patternDirection({point[0][i], point[1][i], point[2][i]});
+    for (int k = 0; k < 3; ++k)
+      direction[k][i] = r[k];
   }
 }
 

@@ -10,6 +10,23 @@
 namespace holdfast {
 
 Sensor
+withCamera(Sensor sensor, const Camera& camera)
+{
+  const double ratio = static_cast<double>(camera.width) / sensor.camera.width;
+  for (PatternWave& wave : sensor.pattern.waves)
+    wave.length_px *= ratio;
+  sensor.camera = camera;
+  return sensor;
+}
+
+Sensor
+withoutPattern(Sensor sensor)
+{
+  sensor.pattern = {};
+  return sensor;
+}
+
+Sensor
 withConstantNoise(Sensor sensor, double sigma_m)
 {
   std::ostringstream name;
@@ -17,6 +34,7 @@ withConstantNoise(Sensor sensor, double sigma_m)
   name << "constant noise of " << 1e3 * sigma_m << " mm";
   sensor.name = name.str();
   sensor.pattern = {}; // it belongs to the camera that this replaces
+  sensor.pattern = {};
   sensor.noise = std::make_shared<const ConstantNoiseModel>(
       ConstantNoiseModel::Parameters{sigma_m, sigma_m});
   return sensor;

@@ -57,6 +57,27 @@ StereoNoiseModel::covariances(int n,
   }
 }
 
+Eigen::Vector3d
+StereoNoiseModel::patternDirection(const Eigen::Vector3d& q) const
+{
+  return -q.z() / (parameters_.focal_px * parameters_.baseline_m) * q;
+}
+
+void
+StereoNoiseModel::patternDirections(int n,
+                                    const double* const point[3],
+                                    double* const direction[3]) const
+{
+  const double per_z = -1.0 / (parameters_.focal_px * parameters_.baseline_m);
+  const double* __restrict z = point[2];
+  for (int k = 0; k < 3; ++k) {
+    const double* __restrict q = point[k];
+    double* __restrict r = direction[k];
+    for (int i = 0; i < n; ++i)
+      r[i] = per_z * z[i] * q[i];
+  }
+}
+
 std::string
 StereoNoiseModel::name() const
 {

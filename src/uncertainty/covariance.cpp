@@ -125,6 +125,21 @@ planeStageTerms(const PatchFit& fit,
       ParameterMatrix(Gp * fit.plane.linearization.XX * Gp.transpose() + 2.0 * cross));
 }
 
+// What errors that points share add to the covariance.
+ParameterMatrix
+patternTerms(const PatternMatrix& pattern, const ByTheta& G, const ByMoments& M)
+{
+  Eigen::Matrix<double,
+                Eigen::Dynamic,
+                kPatternTerms,
+                Eigen::RowMajor,
+                kMaxParameters,
+                kPatternTerms>
+      J(G.rows(), kPatternTerms);
+  J << G, M;
+  return J.lazyProduct(pattern).eval().lazyProduct(J.transpose());
+}
+
 ParameterMatrix
 firstOrderCovariance(const PatchFit& fit,
                      const PointBatch& batch,
@@ -143,6 +158,8 @@ firstOrderCovariance(const PatchFit& fit,
   const ByMoments with_moments = M.lazyProduct(l.DD);
   ParameterMatrix covariance =
       with_theta.lazyProduct(G.transpose()) + with_moments.lazyProduct(M.transpose());
+  if (l.has_pattern)
+    covariance += patternTerms(l.pattern, G, M);
   if (fit.has_plane_stage)
     covariance += planeStageTerms(fit, batch, options, G, M, mode);
   return symmetrized(covariance);
@@ -158,6 +175,13 @@ jointCovariance(const PatchFit& fit, const PointBatch& batch, const FitOptions& 
   joint.topLeftCorner<6, 6>() = thetaCovariance(l, l.H);
   joint.block<6, 9>(0, JointLayout::kMean) = -inverse * (l.XD + l.A * l.DD);
   joint.block<9, 9>(JointLayout::kMean, JointLayout::kMean) = l.DD;
+  if (l.has_pattern) {
+    const auto with_moments = l.pattern.topRightCorner<6, 9>();
+    const auto moments = l.pattern.bottomRightCorner<9, 9>();
+    joint.block<6, 9>(0, JointLayout::kMean) -=
+        inverse * (with_moments + l.A * moments);
+    joint.block<9, 9>(JointLayout::kMean, JointLayout::kMean) += moments;
+  }
   if (fit.has_plane_stage) {
     const Linearization& p = fit.plane.linearization;
     const PlaneStageSums sums = planeStageSums(fit, batch, options);
@@ -267,6 +291,18 @@ isCentreBeyondReach(const PatchFit& fit)
 }
 
 } // namespace
+
+double
+expectedChi2(const PatchFit& fit)
+{
+  const SurfaceFit& surface = fit.surface;
+  const Linearization& l = surface.linearization;
+  const int p = kernel::parameterCount(surface.surface.model);
+  if (!l.has_pattern)
+    return fit.points - p;
+  const ThetaMatrix gradient = l.XX + l.pattern.topLeftCorner<6, 6>();
+  return fit.points - symmetricInverse(l.H).cwiseProduct(gradient).sum();
+}
 
 FitStatus
 observability(const PatchFit& fit, const ParameterMatrix& covariance)

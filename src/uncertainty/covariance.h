@@ -28,6 +28,11 @@ PatchCovariance patchCovariance(const PatchFit& fit,
                                 const PatchFitter& fitter,
                                 CovarianceMode mode);
 
+/// The mean of chi2 where surface and noise are right: E[chi2] is that of the errors,
+/// one a point, less tr(H^-1 Cov(E_theta)), what the surface takes up of them. Of
+/// independent errors that is the number of its parameters, of shared ones more.
+double expectedChi2(const PatchFit& fit);
+
 /// What the covariance says of the fit: Converged, or which direction the data do not
 /// determine.
 FitStatus observability(const PatchFit& fit, const ParameterMatrix& covariance);

@@ -4,29 +4,85 @@
 
 #include <holdfast/uncertainty/monte_carlo.h>
 
+#include <Eigen/Cholesky>
+
+#include <cmath>
 #include <optional>
 #include <stdexcept>
 
 namespace holdfast {
 namespace {
 
-// Noise-free points and the noise to draw.
+// Noise-free points and the noise to draw: errors of their own, N(0, S S^T) with the
+// roots S, and those they share, e r_i with e = L n.
 struct Model {
   Eigen::Vector3d origin, viewpoint;
   std::vector<Eigen::Vector3d> points;
   std::vector<Eigen::Matrix3d> covariances;
   std::vector<Eigen::Matrix3d> roots;
+  std::shared_ptr<const CorrelatedNoise> pattern; // null: they share none
+  std::vector<Eigen::Vector2d> pixels;
+  std::vector<Eigen::Vector3d> directions;
+  Eigen::MatrixXd shared_root; // L
 };
+
+void
+copyPattern(const PointBatch& from, int i, PointBatch& to)
+{
+  for (int c = PointBatch::U; c <= PointBatch::EZ; ++c) {
+    const auto channel = static_cast<PointBatch::Channel>(c);
+    to.channel(channel)[to.size() - 1] = from.channel(channel)[i];
+  }
+}
+
+// L L^T is the covariance of the shared errors over all pairs of points.
+Eigen::MatrixXd
+sharedRoot(const NoisePattern& pattern, const std::vector<Eigen::Vector2d>& pixels)
+{
+  const auto n = static_cast<Eigen::Index>(pixels.size());
+  Eigen::MatrixXd C(n, n);
+  for (Eigen::Index i = 0; i < n; ++i)
+    for (Eigen::Index j = 0; j < n; ++j)
+      C(i, j) = pattern.covariance(
+          (pixels[static_cast<std::size_t>(i)] - pixels[static_cast<std::size_t>(j)])
+              .norm());
+  // Points in one place, and smooth waves, leave directions without variance.
+  constexpr double kRounding = 1e-9;
+  C.diagonal().array() += kRounding * pattern.variance();
+  return C.llt().matrixL();
+}
+
+void
+addShared(const PointBatch& valid, Model& model)
+{
+  const double variance = model.pattern->pattern().variance();
+  for (int i = 0; i < valid.size(); ++i) {
+    model.pixels.emplace_back(valid.channel(PointBatch::U)[i],
+                              valid.channel(PointBatch::V)[i]);
+    model.directions.emplace_back(valid.channel(PointBatch::EX)[i],
+                                  valid.channel(PointBatch::EY)[i],
+                                  valid.channel(PointBatch::EZ)[i]);
+    const Eigen::Vector3d& r = model.directions.back();
+    model.roots[static_cast<std::size_t>(i)] =
+        squareRoot(valid.covariance(i) - variance * r * r.transpose());
+  }
+  model.shared_root = sharedRoot(model.pattern->pattern(), model.pixels);
+}
 
 Model
 modelOf(const PointBatch& batch)
 {
   PointBatch valid;
   valid.clear(batch.origin());
-  for (int i = 0; i < batch.size(); ++i)
-    valid.add(batch.point(i), batch.covariance(i));
-  valid.removeInvalid();
   Model model;
+  model.pattern = batch.sharedPattern();
+  valid.setPattern(model.pattern);
+  for (int i = 0; i < batch.size(); ++i) {
+    valid.add(batch.point(i), batch.covariance(i));
+    if (model.pattern)
+      copyPattern(batch, i, valid);
+  }
+  valid.removeInvalid();
   model.origin = batch.origin();
   model.viewpoint = batch.viewpoint();
   for (int i = 0; i < valid.size(); ++i) {
@@ -34,16 +90,41 @@ modelOf(const PointBatch& batch)
     model.covariances.push_back(valid.covariance(i));
     model.roots.push_back(squareRoot(valid.covariance(i)));
   }
+  if (model.pattern)
+    addShared(valid, model);
   return model;
+}
+
+void
+drawShared(const Model& model, std::mt19937_64& generator, PointBatch& batch)
+{
+  std::normal_distribution<double> normal;
+  Eigen::VectorXd n(batch.size());
+  for (double& number : n)
+    number = normal(generator);
+  const Eigen::VectorXd e = model.shared_root.triangularView<Eigen::Lower>() * n;
+  for (int i = 0; i < batch.size(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    batch.channel(PointBatch::U)[i] = model.pixels[at].x();
+    batch.channel(PointBatch::V)[i] = model.pixels[at].y();
+    for (int k = 0; k < 3; ++k) {
+      const double r = model.directions[at][k];
+      batch.channel(static_cast<PointBatch::Channel>(PointBatch::EX + k))[i] = r;
+      batch.channel(static_cast<PointBatch::Channel>(PointBatch::X + k))[i] += r * e[i];
+    }
+  }
 }
 
 void
 drawPoints(const Model& model, std::mt19937_64& generator, PointBatch& batch)
 {
   batch.clear(model.origin, model.viewpoint);
+  batch.setPattern(model.pattern);
   for (std::size_t i = 0; i < model.points.size(); ++i)
     batch.add(sampleGaussian(model.points[i], model.roots[i], generator),
               model.covariances[i]);
+  if (model.pattern)
+    drawShared(model, generator, batch);
 }
 
 void

@@ -26,6 +26,7 @@ BEGIN {
   allowed["io"] = allowed["pcl"] " pcl"
   # Headers above the rooms: the front door, and what all may know.
   room["patch_estimator"] = "front"
+  room["correlated_noise"] = "ground"
   room["enum_names"] = "ground"
   room["noise_pattern"] = "ground"
   room["progress"] = "ground"

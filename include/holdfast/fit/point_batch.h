@@ -2,9 +2,12 @@
 /// kernel.
 #pragma once
 
+#include <holdfast/correlated_noise.h>
+
 #include <Eigen/Core>
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 namespace holdfast {
@@ -18,18 +21,28 @@ inline constexpr double kUninformativeTraceRatio = 100.0;
 
 /// N points with covariances in structure-of-arrays form: ten channels
 /// x y z sxx sxy sxz syy syz szz w in one aligned block, padded to a multiple of
-/// kLaneMultiple with points of weight 0, and three more for the points at which a
-/// noise model is to be evaluated (holdfast/fit/reference_points.h). Coordinates are
+/// kLaneMultiple with points of weight 0, three more for the points at which a noise
+/// model is to be evaluated (holdfast/fit/reference_points.h), and six for errors that
+/// points share (setPattern()). Coordinates are
 /// relative to `origin()`, so that clouds far from zero lose no precision. Memory is
 /// kept between uses: a batch that is refilled does not allocate once it has seen its
 /// largest neighbourhood.
 class PointBatch {
 public:
-  enum Channel { X, Y, Z, SXX, SXY, SXZ, SYY, SYZ, SZZ, W, RX, RY, RZ, kChannels };
+  // clang-format off
+  enum Channel {
+    X, Y, Z, SXX, SXY, SXZ, SYY, SYZ, SZZ, W,
+    RX, RY, RZ, ///< where to evaluate the noise model
+    U, V, ///< pixel of the sensor's camera
+    EX, EY, EZ, ///< how the point moves with the shared error, per unit of it
+    EXTRA, ///< for the fit
+    kChannels
+  };
+  // clang-format on
   static constexpr int kLaneMultiple = 8;
 
   /// Forgets all points; `origin` in world coordinates should be near the points to
-  /// come. The viewpoint is the world's origin again.
+  /// come. The viewpoint is the world's origin again, and there is no pattern.
   void clear(const Eigen::Vector3d& origin);
 
   /// The same, for points seen from a viewpoint.
@@ -43,6 +56,26 @@ public:
   const Eigen::Vector3d& viewpoint() const
   {
     return viewpoint_;
+  }
+
+  /// Tells that the errors of the points are correlated. Their pixels (U, V) and the
+  /// directions of their shared error (EX, EY, EZ) are to be written through channel();
+  /// the covariances are those of single points, shared error included. Weights and
+  /// estimate do not depend on it, the covariance of the estimate does.
+  void setPattern(std::shared_ptr<const CorrelatedNoise> pattern)
+  {
+    pattern_ = std::move(pattern);
+  }
+
+  /// Null: all errors are independent.
+  const CorrelatedNoise* pattern() const
+  {
+    return pattern_.get();
+  }
+
+  const std::shared_ptr<const CorrelatedNoise>& sharedPattern() const
+  {
+    return pattern_;
   }
 
   /// Makes room for n points without allocating later.
@@ -113,6 +146,7 @@ private:
   int capacity_ = 0;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d viewpoint_ = Eigen::Vector3d::Zero();
+  std::shared_ptr<const CorrelatedNoise> pattern_;
 };
 
 } // namespace holdfast

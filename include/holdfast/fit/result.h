@@ -56,6 +56,10 @@ struct FitResult {
   /// (points minus surface parameters).
   double chi2 = 0.0;
   int chi2_dof = 0;
+  /// What chi2 is on average where surface and noise are right: chi2_dof for
+  /// independent errors; where points share errors, their number less what the surface
+  /// takes up of them.
+  double chi2_expected = 0.0;
   int points = 0; ///< points used
   int invalid_points = 0; ///< points left out: not finite or indefinite covariance
   /// Points left out because they cannot inform beside the others: the trace of their
@@ -82,8 +86,9 @@ double centreSigma(const FitResult& fit);
 /// \param direction of any length but zero.
 double centreSigma(const FitResult& fit, const Eigen::Vector3d& direction);
 
-/// chi2 / chi2_dof: about 1 where surface and noise model are right. Zero without
-/// degrees of freedom.
+/// chi2 / chi2_expected: about 1 where surface and noise model are right. Zero without
+/// degrees of freedom. Results without an expectation (from files of former versions):
+/// over chi2_dof.
 double chi2PerDof(const FitResult& fit);
 
 } // namespace holdfast

@@ -52,6 +52,18 @@ public:
       int width,
       int height) const;
 
+  /// How the point q moves with the error that neighbouring pixels share (Sensor's
+  /// pattern), per unit of it, camera frame. Here along the ray, m per m at a range of
+  /// 1 m: the pattern grows with range as the standard deviation along the ray does.
+  /// \param q point with z > 0.
+  virtual Eigen::Vector3d patternDirection(const Eigen::Vector3d& q) const;
+
+  /// The same for n points at once. The arrays of points and directions may not
+  /// overlap.
+  virtual void patternDirections(int n,
+                                 const double* const point[3],
+                                 double* const direction[3]) const;
+
   /// True when a pixel's noise depends on its neighbours: organized clouds then get
   /// their covariances from imageCovariances().
   virtual bool dependsOnNeighbors() const

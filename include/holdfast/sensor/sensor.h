@@ -26,8 +26,16 @@ struct Sensor {
   double disparity_focal_px = 580.0;
 };
 
-/// The sensor with the same noise for every point in every direction, and a name that
-/// says so: for clouds that the sensor's model does not describe.
+/// The sensor with the camera that a cloud was taken with. The lengths of the pattern
+/// follow its pixels: those of an image of half the width, of the same view, are twice
+/// as large.
+Sensor withCamera(Sensor sensor, const Camera& camera);
+
+/// The sensor without its pattern: errors of neighbouring pixels count as independent.
+Sensor withoutPattern(Sensor sensor);
+
+/// The sensor with the same noise for every point in every direction, without pattern,
+/// and a name that says so: for clouds that the sensor's model does not describe.
 Sensor withConstantNoise(Sensor sensor, double sigma_m);
 
 } // namespace holdfast

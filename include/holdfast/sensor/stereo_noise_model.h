@@ -39,6 +39,11 @@ public:
                    const double* y,
                    const double* z,
                    const CovarianceChannels& out) const override;
+  /// Column d of J: m per px of disparity.
+  Eigen::Vector3d patternDirection(const Eigen::Vector3d& q) const override;
+  void patternDirections(int n,
+                         const double* const point[3],
+                         double* const direction[3]) const override;
   std::string name() const override;
 
   const Parameters& parameters() const

@@ -30,8 +30,8 @@ struct MonteCarloResult {
 };
 
 /// Spread of the estimate when the noise is drawn again: every trial adds noise
-/// N(0, Sigma_i) to the given points, keeps the Sigma_i, and fits a patch of the
-/// reference's type.
+/// N(0, Sigma_i) to the given points, correlated where the batch has a pattern (over
+/// all pairs of points), keeps the Sigma_i, and fits a patch of the reference's type.
 ///
 /// Drawn about noise-free points this is the truth that the other modes are judged by;
 /// about measured points it is the parametric bootstrap.

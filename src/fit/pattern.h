@@ -1,0 +1,75 @@
+/// \file Errors that points share, summed over a patch.
+///
+/// With y_i = (X_i r_i, D_i r_i), 15 numbers that tell how the surface's gradient and
+/// the moments move with the shared error of point i (fit/kernel.h, surface_fit.h), the
+/// pattern adds
+///
+///     sum_{i != j} y_i C(u_i - u_j) y_j^T
+///
+/// to what independent errors of the same size give. Components of the pattern
+/// (CorrelatedNoise) much shorter than a patch are met in a point's neighbourhood: they
+/// are extra variance of the point along r_i, once for each of its neighbours, in the
+/// sums of the covariance but not in the weights. Longer ones are summed over pairs of
+/// cells of a grid over the patch, with their mean over both cells.
+#pragma once
+
+#include "kernel.h"
+#include <holdfast/fit/point_batch.h>
+
+#include <Eigen/Core>
+
+#include <array>
+
+namespace holdfast {
+
+struct Scatter;
+
+/// y of a cell: X_i r_i (6), D_i r_i for mean (3) and scatter xx xy xz yy yz zz (6).
+inline constexpr int kPatternTerms = kernel::kMaxTheta + 9;
+using PatternMatrix =
+    Eigen::Matrix<double, kPatternTerms, kPatternTerms, Eigen::DontAlign>;
+
+/// How the points of a patch lie in the image, and the cells over them.
+class PatternSupport {
+public:
+  /// Cells along each side.
+  static constexpr int kCells = 8;
+
+  PatternSupport() = default;
+
+  /// Measures the support of a padded batch that has a pattern, and writes its channel
+  /// EXTRA.
+  explicit PatternSupport(PointBatch& batch);
+
+  /// The pattern's share in the gradient's and the moments' covariance, axes of the
+  /// frame R; what EXTRA stands for not included.
+  /// \param response X_i r_i as from the kernel.
+  PatternMatrix sum(const PointBatch& batch,
+                    const Scatter& scatter,
+                    const Eigen::Matrix3d& R,
+                    const double* response) const;
+
+private:
+  bool isShort(const CorrelatedNoise::Component& wave) const;
+  int cellOf(double u, double v) const;
+  std::array<double, kCells * kCells> covarianceOfCells(
+      const CorrelatedNoise& noise) const;
+  void addResponses(const PointBatch& batch,
+                    const double* response,
+                    double* cells) const;
+  void addMoments(const PointBatch& batch,
+                  const Eigen::Vector3d& mean,
+                  double* cells) const;
+  void writeExtra(PointBatch& batch) const;
+
+  double u0_ = 0.0, v0_ = 0.0; ///< corner of the grid, px
+  double side_px_ = 1.0; ///< of a cell
+  double spacing_px_ = 1.0; ///< of the points, as if on a square lattice
+  /// Uniform ellipse with the pixels' mean and second moments: its centre, and the
+  /// matrix that makes it the unit disc.
+  Eigen::Vector2d mean_ = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d to_disc_ = Eigen::Matrix2d::Identity();
+  double radius_px_ = 1.0; ///< geometric mean of its semi-axes
+};
+
+} // namespace holdfast
