@@ -1,5 +1,6 @@
 #include "boundary_fit.h"
 
+#include "fit/models/models.h"
 #include "geometry/symmetric.h"
 #include <holdfast/geometry/rotation.h>
 
@@ -14,21 +15,9 @@
 namespace holdfast {
 namespace {
 
-using kernel::Model;
-using Row = Eigen::Matrix<double, 1, JointLayout::kSize>;
-using Rows2 = Eigen::Matrix<double, 2, JointLayout::kSize, Eigen::RowMajor>;
-using Rows3 = Eigen::Matrix<double, 3, JointLayout::kSize, Eigen::RowMajor>;
-
-// Differences of curvatures or moments this much smaller than the values themselves are
-// taken as this large: the axis is arbitrary then, and its variance huge but finite.
-constexpr double kSmallestRelativeGap = 1e-6;
-
-double
-safeGap(double gap, double scale)
-{
-  const double smallest = std::max(kSmallestRelativeGap * scale, 1e-300);
-  return std::abs(gap) < smallest ? std::copysign(smallest, gap) : gap;
-}
+using Row = JointRow;
+using Rows2 = JointRows2;
+using Rows3 = JointRows3;
 
 // A local frame, the moments of the points in it, and how both move with the joint
 // variables. Rows are in the axes of R; gamma = R^T dc.
@@ -39,14 +28,6 @@ struct MomentFrame {
   Eigen::Matrix3d M; // scatter about the mean, R^T C R
   Rows3 delta, gamma, dmean;
   Row dxx, dxy, dyy; // of M
-};
-
-// A frame before its moments are looked at: columns of the joint are in the axes of the
-// surface's R, rows of delta and gamma in those of the final frame.
-struct Placement {
-  Eigen::Matrix3d R;
-  Eigen::Vector3d c;
-  Rows3 delta = Rows3::Zero(), gamma = Rows3::Zero();
 };
 
 // Moments in a placed frame. W: from the axes of the surface to those of the frame.
@@ -116,99 +97,6 @@ canonicalAxes(const Eigen::Matrix3d& R)
                           std::abs(x[1]) > kTie ? x[1] :
                                                   x[2];
   return decisive < 0.0 ? turnedAboutZ(R, -1.0, 0.0) : R;
-}
-
-// The normal that sphere and cylinder take over, in the axes of the surface.
-struct NormalMap {
-  Eigen::Vector3d n;
-  Rows3 dn = Rows3::Zero();
-};
-
-NormalMap
-normalMap(const UnboundedSurface& surface,
-          const Scatter& scatter,
-          const UnboundedSurface* plane)
-{
-  NormalMap map;
-  if (plane) {
-    const Eigen::Matrix3d turn = surface.R.transpose() * plane->R;
-    map.n = turn.col(2);
-    map.dn.col(JointLayout::kPlane) = -turn.col(1);
-    map.dn.col(JointLayout::kPlane + 1) = turn.col(0);
-    return map;
-  }
-  map.n = surface.R.transpose() * scatter.normal();
-  const Eigen::Matrix3d C = surface.R.transpose() * scatter.covariance * surface.R;
-  map.dn.middleCols<6>(JointLayout::kScatter) = normalJacobian(C, map.n);
-  return map;
-}
-
-// delta and gamma of the paraboloid's frame, I-2: c = mean + a n.
-Placement
-placeParaboloid(const UnboundedSurface& surface, const Scatter& scatter)
-{
-  const NormalMap normal = normalMap(surface, scatter, nullptr);
-  Placement p{surface.R, surface.c};
-  p.delta(0, 3) = p.delta(1, 4) = 1.0;
-  p.gamma.middleCols<3>(JointLayout::kMean).setIdentity();
-  p.gamma += surface.a * normal.dn;
-  p.gamma.col(5) += normal.n;
-  return p;
-}
-
-Placement
-placePlane(const UnboundedSurface& surface)
-{
-  Placement p{surface.R, surface.c};
-  p.delta(0, 0) = p.delta(1, 1) = 1.0;
-  p.gamma(2, 2) = 1.0;
-  return p;
-}
-
-// I-2 (ii), s = sphere: apex c = centre - n/k, centre = c_fit + z/k
-// (paper eq. (4) with the missing terms dc = dC + n dk/k^2 - dn/k).
-Placement
-placeSphere(const UnboundedSurface& surface, const NormalMap& normal)
-{
-  const double k = safeGap(surface.k[0], 1.0);
-  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
-  Placement p{surface.R, surface.c + surface.R * (z - normal.n) / k};
-  p.gamma = normal.dn / -k;
-  p.gamma.middleCols<3>(1) += Eigen::Matrix3d::Identity();
-  p.gamma.col(0) += (normal.n - z) / (k * k);
-  // In the surface's axes: the rotation that moves n, about axes normal to it.
-  p.delta = skew(normal.n) * normal.dn;
-  return p;
-}
-
-// I-2 (ii), s = circular cylinder: z' = normalise(n - x x^T n) (paper eq. (5): [x y z]
-// is a rotation only with z normal to x), apex on the axis' near side. None when n is
-// along the axis.
-std::optional<Placement>
-placeCylinder(const UnboundedSurface& surface, const NormalMap& normal)
-{
-  constexpr double kSmallestSine = 1e-3;
-  const double k = safeGap(surface.k[0], 1.0);
-  const double across = std::hypot(normal.n.y(), normal.n.z());
-  if (across < kSmallestSine)
-    return std::nullopt;
-  const Eigen::Vector3d x = Eigen::Vector3d::UnitX(), z = Eigen::Vector3d::UnitZ();
-  const Eigen::Vector3d up(0.0, normal.n.y() / across, normal.n.z() / across);
-  Rows3 tilt = Rows3::Zero(); // delta of the fit
-  tilt(1, 1) = tilt(2, 2) = 1.0;
-  const Rows3 dn = normal.dn + skew(normal.n) * tilt; // n seen from the moving frame
-  const Row roll = (up.y() * dn.row(2) - up.z() * dn.row(1)) / across; // about x
-  Placement p{surface.R, surface.c + surface.R * (z - up) / k};
-  p.R.col(2) = surface.R * up;
-  p.R.col(1) = p.R.col(2).cross(p.R.col(0));
-  p.delta = tilt;
-  p.delta.row(0) += roll;
-  p.gamma = (skew(z - up) * tilt / -k).eval();
-  p.gamma -= x.cross(up) * roll / k;
-  p.gamma(1, 3) += 1.0;
-  p.gamma(2, 4) += 1.0;
-  p.gamma.col(0) += (up - z) / (k * k);
-  return p;
 }
 
 // The frame of a revolute type, R = Exp([rx ry 0]) with the same z; its twist about z
@@ -380,9 +268,11 @@ writeCircle(PatchWriter& writer,
     writer.boundFromMoment(0, factor, std::max(x, y), x > y ? dx : dy);
 }
 
-// II-8.
+// II-8, and II-6 for the cylindric paraboloid.
 BoundedPatch
-boundTwoCurvatures(const BoundRequest& request, const BoundSettings& settings)
+boundTwoCurvatures(const BoundRequest& request,
+                   const BoundSettings& settings,
+                   const Placement& placed)
 {
   BoundedPatch out;
   PatchWriter writer(request.type, out);
@@ -390,7 +280,7 @@ boundTwoCurvatures(const BoundRequest& request, const BoundSettings& settings)
   const SurfaceType type = request.type.surface;
   CurvatureMap K;
   MomentFrame f = turnedFrame(request,
-                              placeParaboloid(surface, request.scatter),
+                              placed,
                               principalCurvatureAxes(surface),
                               [&](Placement& p, const Eigen::Matrix3d& W) {
                                 K = curvatureMap(surface.k, W);
@@ -416,30 +306,34 @@ boundTwoCurvatures(const BoundRequest& request, const BoundSettings& settings)
   return out;
 }
 
+// The curvature of a type that has one all around.
+void
+writeOneCurvature(PatchWriter& writer, const UnboundedSurface& surface)
+{
+  const Eigen::Vector3d shares =
+      withModel(surface.model, [](auto m) { return m.curvatureShares(); });
+  Row dk = Row::Zero();
+  dk.head<3>() = shares;
+  writer.curvature(0, shares[0] * surface.k[0] + shares[2] * surface.k[2], dk);
+}
+
 // II-7.
 BoundedPatch
-boundRevolute(const BoundRequest& request, const BoundSettings& settings)
+boundRevolute(const BoundRequest& request,
+              const BoundSettings& settings,
+              const Placement& placed)
 {
   BoundedPatch out;
   PatchWriter writer(request.type, out);
   const UnboundedSurface& surface = request.surface;
-  const bool sphere = request.type.surface == SurfaceType::Sphere;
-  const NormalMap normal = normalMap(surface, request.scatter, request.plane);
-  const Placement placed =
-      sphere ? placeSphere(surface, normal) : placeParaboloid(surface, request.scatter);
-  const Eigen::Vector3d z = sphere ? Eigen::Vector3d(surface.R * normal.n) :
-                                     Eigen::Vector3d(surface.R.col(2));
-  const Eigen::Vector2d r_xy = regularRxyFromNormal(z);
+  const Eigen::Vector2d r_xy = regularRxyFromNormal(placed.z);
   Rows2 dr;
   const MomentFrame f = turnedFrame(
       request,
       placed,
       expMap({r_xy.x(), r_xy.y(), 0.0}),
       [&](Placement& p, const Eigen::Matrix3d&) { dr = orientRevolute(r_xy, p); });
-  Row dk = Row::Zero();
-  dk[0] = sphere ? 1.0 : 0.5;
-  dk[2] = sphere ? 0.0 : 0.5;
-  writer.curvature(0, dk[0] * surface.k[0] + dk[2] * surface.k[2], dk);
+  writeOneCurvature(writer, surface);
   const SecondMoments v = secondMoments(f);
   writeCircle(writer,
               v.x,
@@ -454,34 +348,20 @@ boundRevolute(const BoundRequest& request, const BoundSettings& settings)
 
 // II-6 for the circular cylinder.
 BoundedPatch
-boundCylinder(const BoundRequest& request, const BoundSettings& settings)
+boundCylinder(const BoundRequest& request,
+              const BoundSettings& settings,
+              const Placement& placed)
 {
   BoundedPatch out;
   PatchWriter writer(request.type, out);
-  const UnboundedSurface& surface = request.surface;
-  const std::optional<Placement> placed =
-      placeCylinder(surface, normalMap(surface, request.scatter, request.plane));
-  if (!placed) {
-    out.status = FitStatus::Degenerate;
-    return out;
-  }
-  MomentFrame f = turnedFrame(request, *placed, canonicalAxes(placed->R));
+  MomentFrame f = turnedFrame(request, placed, canonicalAxes(placed.R));
   recentre(f, false);
-  Row dk = Row::Zero();
-  dk[0] = 1.0;
-  writer.curvature(0, surface.k[0], dk);
+  writeOneCurvature(writer, request.surface);
   const SecondMoments v = secondMoments(f);
   writer.boundFromMoment(0, settings.factors.lambda, v.x, v.dx);
   writer.boundFromMoment(1, settings.factors.lambda, v.y, v.dy);
   writer.pose(f, request.origin);
   return out;
-}
-
-Placement
-placePlaneOf(const UnboundedSurface& surface, const Scatter& scatter)
-{
-  return surface.model == Model::Plane ? placePlane(surface) :
-                                         placeParaboloid(surface, scatter);
 }
 
 // Principal axes of the in-plane scatter, t = atan2(beta, alpha - phi)/2 of II-9.
@@ -495,16 +375,17 @@ principalScatterAxes(const Eigen::Matrix3d& R, const Scatter& scatter)
 
 // II-9, circle.
 BoundedPatch
-boundPlaneCircle(const BoundRequest& request, const BoundSettings& settings)
+boundPlaneCircle(const BoundRequest& request,
+                 const BoundSettings& settings,
+                 const Placement& placed)
 {
   BoundedPatch out;
   PatchWriter writer(request.type, out);
   const UnboundedSurface& surface = request.surface;
   const Eigen::Vector2d r_xy = regularRxyFromNormal(surface.R.col(2));
   // The larger moment is that of the principal axes; the sum is the same in any.
-  MomentFrame f = turnedFrame(request,
-                              placePlaneOf(surface, request.scatter),
-                              principalScatterAxes(surface.R, request.scatter));
+  MomentFrame f =
+      turnedFrame(request, placed, principalScatterAxes(surface.R, request.scatter));
   recentre(f, true);
   const double scale = std::sqrt(2.0); // l = sqrt(-ln(1-Gamma)) sqrt(2 x moment)
   writeCircle(writer,
@@ -515,7 +396,7 @@ boundPlaneCircle(const BoundRequest& request, const BoundSettings& settings)
               scale * settings.factors.plane,
               settings.smooth_circle_radius);
 
-  Placement revolute{expMap({r_xy.x(), r_xy.y(), 0.0}), f.c};
+  Placement revolute{expMap({r_xy.x(), r_xy.y(), 0.0}), f.c, surface.R.col(2)};
   revolute.delta = revolute.R.transpose() * f.R * f.delta;
   writer.revolutePose(f, r_xy, orientRevolute(r_xy, revolute), request.origin);
   return out;
@@ -525,13 +406,15 @@ boundPlaneCircle(const BoundRequest& request, const BoundSettings& settings)
 // In the principal axes alpha = M_xx, phi = M_yy, beta = 0, and l+-^2 = 2 (alpha, phi)
 // times -ln(1 - Gamma).
 BoundedPatch
-boundPlane(const BoundRequest& request, const BoundSettings& settings)
+boundPlane(const BoundRequest& request,
+           const BoundSettings& settings,
+           const Placement& placed)
 {
   BoundedPatch out;
   PatchWriter writer(request.type, out);
   const Scatter& scatter = request.scatter;
   MomentFrame f = turnedFrame(request,
-                              placePlaneOf(request.surface, scatter),
+                              placed,
                               principalScatterAxes(request.surface.R, scatter),
                               [&](Placement& p, const Eigen::Matrix3d& W) {
                                 // dt = ((alpha - phi) dbeta - beta (dalpha - dphi)) /
@@ -574,21 +457,24 @@ ContainmentFactors::of(double containment)
 BoundedPatch
 boundPatch(const BoundRequest& request, const BoundSettings& settings)
 {
-  switch (request.type.surface) {
-  case SurfaceType::Plane:
-    return isRevolute(request.type) ? boundPlaneCircle(request, settings) :
-                                      boundPlane(request, settings);
-  case SurfaceType::Sphere:
-  case SurfaceType::CircularParaboloid:
-    return boundRevolute(request, settings);
-  case SurfaceType::CircularCylinder:
-    return boundCylinder(request, settings);
-  case SurfaceType::EllipticParaboloid:
-  case SurfaceType::HyperbolicParaboloid:
-  case SurfaceType::CylindricParaboloid:
-    break;
+  const std::optional<Placement> placed = withModel(request.surface.model, [&](auto m) {
+    return m.place({request.surface, request.scatter, request.plane});
+  });
+  if (!placed) {
+    BoundedPatch out;
+    PatchWriter(request.type, out);
+    out.status = FitStatus::Degenerate;
+    return out;
   }
-  return boundTwoCurvatures(request, settings);
+  const bool flat = curvatureParameterCount(request.type.surface) == 0;
+  if (isRevolute(request.type))
+    return flat ? boundPlaneCircle(request, settings, *placed) :
+                  boundRevolute(request, settings, *placed);
+  if (flat)
+    return boundPlane(request, settings, *placed);
+  return isParaboloid(request.type.surface) ?
+             boundTwoCurvatures(request, settings, *placed) :
+             boundCylinder(request, settings, *placed);
 }
 
 } // namespace holdfast

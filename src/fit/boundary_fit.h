@@ -6,19 +6,10 @@
 /// Jacobian.
 #pragma once
 
+#include "placement.h"
 #include "surface_fit.h"
 
 namespace holdfast {
-
-/// What a patch is a function of, in the axes of the surface's frame: theta (6), mean
-/// (3), scatter (6), theta of the plane stage (3).
-struct JointLayout {
-  static constexpr int kTheta = 0;
-  static constexpr int kMean = 6;
-  static constexpr int kScatter = 9;
-  static constexpr int kPlane = 15;
-  static constexpr int kSize = 18;
-};
 
 /// d[d | k | r | c] / d joint; as many rows as the patch has parameters.
 using PatchJacobian = Eigen::Matrix<double,

@@ -1,5 +1,7 @@
 #include "fit_patch.h"
 
+#include "fit/models/models.h"
+
 #include <cmath>
 #include <stdexcept>
 
@@ -11,16 +13,8 @@ using kernel::Model;
 Model
 modelOf(SurfaceRequest request)
 {
-  switch (request) {
-  case SurfaceRequest::Plane:
-    return Model::Plane;
-  case SurfaceRequest::Sphere:
-    return Model::Sphere;
-  case SurfaceRequest::CircularCylinder:
-    return Model::Cylinder;
-  default:
-    return Model::Paraboloid;
-  }
+  const std::optional<SurfaceType> type = surfaceOf(request);
+  return type ? modelOf(*type) : Model::Paraboloid;
 }
 
 bool
@@ -33,11 +27,8 @@ hasExtent(const Scatter& scatter)
 bool
 curvatureInRange(const SurfaceFit& fit, double limit)
 {
-  const Eigen::Vector3d& k = fit.surface.k;
-  if (fit.surface.model != Model::Paraboloid)
-    return std::abs(k[0]) <= limit;
-  const double mean = 0.5 * (k[0] + k[2]);
-  return std::abs(mean) + std::hypot(0.5 * (k[0] - k[2]), k[1]) <= limit;
+  return withModel(fit.surface.model,
+                   [&](auto m) { return m.largestCurvature(fit.surface.k) <= limit; });
 }
 
 SurfaceType
@@ -69,26 +60,10 @@ PatchFitter::patchType(const PatchFit& fit) const
                          defaultBoundary(surface)};
   };
   const SurfaceFit& surface = fit.surface;
-  switch (options_.surface) {
-  case SurfaceRequest::Plane:
-    return typed(SurfaceType::Plane);
-  case SurfaceRequest::Sphere:
-    return typed(SurfaceType::Sphere);
-  case SurfaceRequest::CircularCylinder:
-    return typed(SurfaceType::CircularCylinder);
-  case SurfaceRequest::EllipticParaboloid:
-    return typed(SurfaceType::EllipticParaboloid);
-  case SurfaceRequest::HyperbolicParaboloid:
-    return typed(SurfaceType::HyperbolicParaboloid);
-  case SurfaceRequest::CylindricParaboloid:
-    return typed(SurfaceType::CylindricParaboloid);
-  case SurfaceRequest::CircularParaboloid:
-    return typed(SurfaceType::CircularParaboloid);
-  case SurfaceRequest::Paraboloid:
+  if (const std::optional<SurfaceType> forced = surfaceOf(options_.surface))
+    return typed(*forced);
+  if (options_.surface == SurfaceRequest::Paraboloid)
     return typed(signedType(surface.surface.k));
-  case SurfaceRequest::Auto:
-    break;
-  }
   const ThetaMatrix covariance =
       thetaCovariance(surface.linearization, surface.linearization.H);
   return typed(discriminate(surface.surface.k,
@@ -128,8 +103,7 @@ PatchFitter::fit(PointBatch& batch) const
     return fit;
   }
   // Stage I-1 (i), s != parab: the paper's weighted plane.
-  fit.has_plane_stage =
-      !options_.normal_from_pca && (model == Model::Sphere || model == Model::Cylinder);
+  fit.has_plane_stage = !options_.normal_from_pca && wraps(model);
   if (fit.has_plane_stage) {
     fit.plane = fitSurface(Model::Plane, batch, fit.scatter, fit.support, options_);
     fit.status = fit.plane.status;

@@ -41,36 +41,23 @@ enum class Model : std::uint8_t { Paraboloid, Sphere, Cylinder, Plane };
 
 inline constexpr int kMaxTheta = 6;
 
-constexpr int
-shapeParameterCount(Model model)
-{
-  switch (model) {
-  case Model::Paraboloid:
-    return 5;
-  case Model::Sphere:
-    return 1;
-  case Model::Cylinder:
-    return 3;
-  case Model::Plane:
-    return 2;
-  }
-  return 0;
-}
+/// How many parameters a model has, in the order of the enumeration.
+struct ModelSize {
+  int parameters;
+  int shape_parameters;
+};
+inline constexpr ModelSize kModelSizes[] = {{6, 5}, {4, 1}, {5, 3}, {3, 2}};
 
 constexpr int
 parameterCount(Model model)
 {
-  switch (model) {
-  case Model::Paraboloid:
-    return 6;
-  case Model::Sphere:
-    return 4;
-  case Model::Cylinder:
-    return 5;
-  case Model::Plane:
-    return 3;
-  }
-  return 0;
+  return kModelSizes[static_cast<int>(model)].parameters;
+}
+
+constexpr int
+shapeParameterCount(Model model)
+{
+  return kModelSizes[static_cast<int>(model)].shape_parameters;
 }
 
 /// Index of entry (row, column), row <= column, in a packed upper triangle of size n.

@@ -3,31 +3,6 @@
 #include <cmath>
 
 namespace holdfast {
-namespace {
-
-SurfaceRequest
-requestFor(SurfaceType surface)
-{
-  switch (surface) {
-  case SurfaceType::Plane:
-    return SurfaceRequest::Plane;
-  case SurfaceType::Sphere:
-    return SurfaceRequest::Sphere;
-  case SurfaceType::CircularCylinder:
-    return SurfaceRequest::CircularCylinder;
-  case SurfaceType::EllipticParaboloid:
-    return SurfaceRequest::EllipticParaboloid;
-  case SurfaceType::HyperbolicParaboloid:
-    return SurfaceRequest::HyperbolicParaboloid;
-  case SurfaceType::CylindricParaboloid:
-    return SurfaceRequest::CylindricParaboloid;
-  case SurfaceType::CircularParaboloid:
-    break;
-  }
-  return SurfaceRequest::CircularParaboloid;
-}
-
-} // namespace
 
 FitOptions
 FitOptions::paper()

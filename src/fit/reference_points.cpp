@@ -1,5 +1,6 @@
 #include <holdfast/fit/reference_points.h>
 
+#include "fit/surface_fit.h"
 #include "fit/surface_start.h"
 
 namespace holdfast {

@@ -2,7 +2,7 @@
 #include "levenberg_marquardt.h"
 #include <holdfast/geometry/rotation.h>
 
-#include "fit/surface_start.h"
+#include "fit/models/models.h"
 #include "geometry/symmetric.h"
 
 #include <Eigen/Cholesky>
@@ -27,52 +27,6 @@ constexpr double kSmallestPivot = 1e-10;
 // Exact Newton steps at the end; each squares the error, so more than a few mean
 // trouble.
 constexpr int kMaxPolishSteps = 12;
-
-// L[f_ab] for the shape parameters, upper triangle.
-void
-addCurvatureTerms(const UnboundedSurface& surface, const double L[], ThetaMatrix& H)
-{
-  using namespace kernel;
-  const Eigen::Vector3d& k = surface.k;
-  switch (surface.model) {
-  case Model::Paraboloid:
-    H(0, 4) -= 2.0 * L[PXZ];
-    H(1, 3) += 2.0 * L[PXZ];
-    H(1, 4) -= 2.0 * L[PYZ];
-    H(2, 3) += 2.0 * L[PYZ];
-    H(3, 3) += 2.0 * (k[2] * (L[PZZ] - L[PYY]) - k[1] * L[PXY] + L[PZ]);
-    H(4, 4) += 2.0 * (k[0] * (L[PZZ] - L[PXX]) - k[1] * L[PXY] + L[PZ]);
-    H(3, 4) += (k[0] + k[2]) * L[PXY] + k[1] * (L[PXX] + L[PYY] - 2.0 * L[PZZ]);
-    break;
-  case Model::Sphere:
-    break;
-  case Model::Cylinder:
-    H(0, 1) += 2.0 * L[PXZ];
-    H(0, 2) -= 2.0 * L[PXY];
-    H(1, 1) += 2.0 * (k[0] * (L[PXX] - L[PZZ]) + L[PZ]);
-    H(2, 2) += 2.0 * k[0] * (L[PXX] - L[PYY]);
-    H(1, 2) += 2.0 * k[0] * L[PYZ] - L[PY];
-    break;
-  case Model::Plane:
-    H(0, 0) += 2.0 * L[PZ];
-    H(1, 1) += 2.0 * L[PZ];
-    break;
-  }
-}
-
-// Directions of the translation parameters, local axes, one column each.
-Eigen::Matrix3d
-translationDirections(const UnboundedSurface& surface, const Eigen::Vector3d& line)
-{
-  Eigen::Matrix3d directions = Eigen::Matrix3d::Identity();
-  if (surface.model == Model::Paraboloid)
-    directions.col(0) = surface.R.transpose() * line;
-  else if (surface.model == Model::Cylinder)
-    directions << 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0;
-  else if (surface.model == Model::Plane)
-    directions.col(0) = Eigen::Vector3d::UnitZ();
-  return directions;
-}
 
 // E_theta, zero on padding.
 Theta
@@ -130,7 +84,7 @@ unitScale(const ThetaMatrix& H, Model model)
 {
   const int n = kernel::parameterCount(model);
   const int shape = kernel::shapeParameterCount(model);
-  const int first_rotation = model == Model::Sphere ? shape : shape - 2;
+  const int first_rotation = withModel(model, [](auto m) { return m.kFirstRotation; });
   Theta scale = Theta::Ones();
   for (int i = 0; i < n; ++i) {
     const bool rotation = i >= first_rotation && i < shape;
@@ -190,23 +144,12 @@ nullSpaceOf(const ThetaMatrix& H, Model model)
   return space;
 }
 
-Eigen::Matrix<double, kernel::kMaxTheta, 3>
-crossSumMatrix(const kernel::CovarianceSums& sums, int n)
-{
-  Eigen::Matrix<double, kernel::kMaxTheta, 3> T;
-  T.setZero();
-  for (int a = 0; a < n; ++a)
-    for (int i = 0; i < 3; ++i)
-      T(a, i) = sums.X[a][i];
-  return T;
-}
-
 // Hessian: shape block from the sums; columns of translations along d are -sum X_i d,
 // since the cost depends on q - c alone.
 ThetaMatrix
 hessian(const UnboundedSurface& surface,
-        const kernel::CovarianceSums& sums,
-        const Eigen::Matrix3d& directions)
+        const Scatter& scatter,
+        const kernel::CovarianceSums& sums)
 {
   const int shape = kernel::shapeParameterCount(surface.model);
   const int n = kernel::parameterCount(surface.model);
@@ -214,7 +157,10 @@ hessian(const UnboundedSurface& surface,
   for (int a = 0, entry = 0; a < shape; ++a)
     for (int b = a; b < shape; ++b, ++entry)
       H(a, b) = sums.H[entry];
-  addCurvatureTerms(surface, sums.L, H);
+  withModel(surface.model, [&](auto m) { m.addCurvatureTerms(surface, sums.L, H); });
+  const Eigen::Matrix3d directions = withModel(surface.model, [&](auto m) {
+    return m.translations(surface, scatter);
+  });
   const auto T = crossSumMatrix(sums, n);
   for (int i = shape; i < n; ++i)
     H.col(i).head(n) = -T.topRows(n) * directions.col(i - shape);
@@ -222,34 +168,6 @@ hessian(const UnboundedSurface& surface,
     for (int b = a + 1; b < n; ++b)
       H(b, a) = H(a, b);
   return H;
-}
-
-// E_c = L[-g] of a paraboloid, local axes.
-Eigen::Vector3d
-centreGradient(const Eigen::Vector3d& k, const double L[])
-{
-  using namespace kernel;
-  return {-2.0 * (k[0] * L[PX] + k[1] * L[PY]),
-          -2.0 * (k[1] * L[PX] + k[2] * L[PY]),
-          2.0 * L[P1]};
-}
-
-// A = d^2E/dtheta ds. Only the paraboloid depends on the moments: c = mean + a n(C).
-ThetaByMoments
-momentCross(const UnboundedSurface& surface,
-            const Scatter& scatter,
-            const kernel::CovarianceSums& sums)
-{
-  ThetaByMoments A = ThetaByMoments::Zero();
-  if (surface.model != Model::Paraboloid)
-    return A;
-  const Eigen::Matrix3d C = surface.R.transpose() * scatter.covariance * surface.R;
-  const Matrix36 dn = normalJacobian(C, surface.R.transpose() * scatter.normal());
-  const auto T = crossSumMatrix(sums, kernel::kMaxTheta);
-  A.leftCols<3>() = -T;
-  A.rightCols<6>() = (-surface.a * T).lazyProduct(dn);
-  A.row(5).tail<6>() += centreGradient(surface.k, sums.L).transpose() * dn;
-  return A;
 }
 
 // Covariance of the moments. D_i: mean I/N, scatter bc (qt_b e_c + qt_c e_b)/N.
@@ -286,8 +204,9 @@ linearize(const UnboundedSurface& surface,
           Linearization& result)
 {
   const int n = kernel::parameterCount(surface.model);
-  result.H = hessian(surface, sums, translationDirections(surface, scatter.normal()));
-  result.A = momentCross(surface, scatter, sums);
+  result.H = hessian(surface, scatter, sums);
+  result.A = withModel(surface.model,
+                       [&](auto m) { return m.momentCross(surface, scatter, sums); });
   const double inverse_count = 1.0 / scatter.count;
   for (int a = 0, entry = 0; a < n; ++a) {
     for (int b = a; b < n; ++b, ++entry)
@@ -502,38 +421,24 @@ fitThick(const SurfaceProblem& problem,
 
 } // namespace
 
+Eigen::Matrix<double, kernel::kMaxTheta, 3>
+crossSumMatrix(const kernel::CovarianceSums& sums, int n)
+{
+  Eigen::Matrix<double, kernel::kMaxTheta, 3> T;
+  T.setZero();
+  for (int a = 0; a < n; ++a)
+    for (int i = 0; i < 3; ++i)
+      T(a, i) = sums.X[a][i];
+  return T;
+}
+
 UnboundedSurface
 retractedSurface(const UnboundedSurface& surface,
                  const Scatter& scatter,
                  const Theta& step)
 {
-  UnboundedSurface next = surface;
-  Eigen::Vector3d delta = Eigen::Vector3d::Zero(), shift = Eigen::Vector3d::Zero();
-  switch (surface.model) {
-  case Model::Paraboloid:
-    next.k += step.head<3>();
-    delta.head<2>() = step.segment<2>(3);
-    next.a += step[5];
-    break;
-  case Model::Sphere:
-    next.k[0] += step[0];
-    shift = step.segment<3>(1);
-    break;
-  case Model::Cylinder:
-    next.k[0] += step[0];
-    delta.tail<2>() = step.segment<2>(1);
-    shift.tail<2>() = step.segment<2>(3);
-    break;
-  case Model::Plane:
-    delta.head<2>() = step.head<2>();
-    shift.z() = step[2];
-    break;
-  }
-  next.R = surface.R * expMap(delta);
-  next.c = surface.model == Model::Paraboloid ?
-               Eigen::Vector3d(scatter.mean + next.a * scatter.normal()) :
-               Eigen::Vector3d(surface.c + surface.R * shift);
-  return next;
+  return withModel(surface.model,
+                   [&](auto m) { return m.retracted(surface, scatter, step); });
 }
 
 kernel::Points
@@ -633,9 +538,10 @@ fitSurface(kernel::Model model,
                                scatter,
                                batch,
                                support};
-  const UnboundedSurface start =
-      surfaceStart(model, options.residual, problem.points, scatter);
-  if (isThick(model, scatter))
+  const UnboundedSurface start = withModel(model, [&](auto m) {
+    return m.start({options.residual, problem.points, scatter});
+  });
+  if (wraps(model) && isThick(scatter))
     return fitThick(problem, options, start);
   SurfaceFit fit;
   fit.surface = start;

@@ -1,8 +1,8 @@
 /// \file Unbounded surfaces: paper stages I-1 and I-2.
 #pragma once
 
-#include "kernel.h"
 #include "pattern.h"
+#include "unbounded_surface.h"
 #include <holdfast/fit/point_batch.h>
 #include <holdfast/fit/result.h>
 
@@ -10,34 +10,11 @@
 
 namespace holdfast {
 
-/// Solver parameters theta in the order of kernel::Model, padded with zeros to six:
-/// every surface then shares one fixed size. Unaligned, so that the layout is the same
-/// for any instruction set.
-using Theta = Eigen::Matrix<double, kernel::kMaxTheta, 1, Eigen::DontAlign>;
-using ThetaMatrix =
-    Eigen::Matrix<double, kernel::kMaxTheta, kernel::kMaxTheta, Eigen::DontAlign>;
-
 /// The moments s of the points: mean (3), then scatter xx xy xz yy yz zz (6).
 inline constexpr int kMoments = 9;
 using ThetaByMoments =
     Eigen::Matrix<double, kernel::kMaxTheta, kMoments, Eigen::DontAlign>;
 using MomentMatrix = Eigen::Matrix<double, kMoments, kMoments, Eigen::DontAlign>;
-
-/// Mean and scatter of the points, relative to the batch's origin.
-struct Scatter {
-  int count = 0;
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  /// Scatter about the mean over N, less the mean point covariance when debiased.
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  /// Principal axes, eigenvalues ascending; z is the normal, towards the viewpoint.
-  Eigen::Vector3d eigenvalues = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
-
-  Eigen::Vector3d normal() const
-  {
-    return axes.col(2);
-  }
-};
 
 /// How the estimate moves with the points, to first order, in the axes of the fit's
 /// frame: with X_i = d^2E/dtheta dq_i, A = d^2E/dtheta ds and D_i = ds/dq_i,
@@ -52,15 +29,6 @@ struct Linearization {
   /// What errors that points share add to XX, XD and DD as one matrix (fit/pattern.h).
   bool has_pattern = false;
   PatternMatrix pattern; ///< meaningful when has_pattern
-};
-
-/// An unbounded surface in the solver's terms.
-struct UnboundedSurface {
-  kernel::Model model = kernel::Model::Paraboloid;
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity(); ///< local to world
-  Eigen::Vector3d c = Eigen::Vector3d::Zero(); ///< relative to the batch's origin
-  Eigen::Vector3d k = Eigen::Vector3d::Zero(); ///< kxx kxy kyy, or k 0 0
-  double a = 0.0; ///< paraboloid: c = mean + a normal
 };
 
 /// A fitted surface and what its covariance needs.
@@ -86,6 +54,11 @@ Scatter measureScatter(const PointBatch& batch,
 Scatter withMoments(const Scatter& scatter,
                     const Eigen::Vector3d& mean,
                     const Eigen::Matrix3d& covariance);
+
+/// sum X_i, the rows of the first n parameters; zero on padding.
+Eigen::Matrix<double, kernel::kMaxTheta, 3> crossSumMatrix(
+    const kernel::CovarianceSums& sums,
+    int n);
 
 /// The surface moved by a step of theta.
 UnboundedSurface retractedSurface(const UnboundedSurface& surface,

@@ -1,9 +1,10 @@
 #include "fit/surface_start.h"
 
+#include "fit/surface_fit.h"
+
 #include <holdfast/geometry/rotation.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
@@ -49,14 +50,11 @@ leastSquaresQuadric(const kernel::Points& points, const Scatter& scatter)
   return {x[0], {x[1], x[2]}, {2.0 * x[3], x[4], 2.0 * x[5]}};
 }
 
-namespace {
-
-using kernel::Model;
-
-// The frame of the quadric where the line along the principal normal meets it.
 UnboundedSurface
-surfaceFromQuadric(Model model, const Quadric& quadric, const Scatter& scatter)
+quadricStart(kernel::Model model, const StartRequest& request)
 {
+  const Scatter& scatter = request.scatter;
+  const Quadric quadric = leastSquaresQuadric(request.points, scatter);
   UnboundedSurface surface;
   surface.model = model;
   surface.a = quadric.a0;
@@ -67,48 +65,28 @@ surfaceFromQuadric(Model model, const Quadric& quadric, const Scatter& scatter)
   const Eigen::Vector2d tilt = rxyFromNormal(up);
   surface.R = scatter.axes * expMap({tilt.x(), tilt.y(), 0.0});
   surface.k = quadric.k / stretch;
-  if (model == Model::Sphere)
-    surface.k = {0.5 * (surface.k[0] + surface.k[2]), 0.0, 0.0};
   return surface;
 }
 
-// Turns the frame about z so that x is the direction of the smaller |curvature|.
-void
-alignCylinder(UnboundedSurface& surface)
+bool
+isThick(const Scatter& scatter)
 {
-  Eigen::Matrix2d K;
-  K << surface.k[0], surface.k[1], surface.k[1], surface.k[2];
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(K);
-  const Eigen::Vector2d values = solver.eigenvalues();
-  const int straight = std::abs(values[0]) < std::abs(values[1]) ? 0 : 1;
-  const Eigen::Vector2d x = solver.eigenvectors().col(straight);
-  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
-  turn.topLeftCorner<2, 2>() << x.x(), -x.y(), x.y(), x.x();
-  surface.R = surface.R * turn;
-  surface.k = {values[1 - straight], 0.0, 0.0};
+  // A cap of half-angle t has eigenvalues in the ratio t^2/12 or so: beyond some 25
+  // degrees a height field misrepresents it.
+  constexpr double kThick = 0.015;
+  return scatter.eigenvalues[0] > kThick * scatter.eigenvalues[2];
 }
 
-// Sphere or, in the plane normal to `axis`, circle by algebraic least squares (Kasa):
-// |q|^2 = 2 centre.q + e. Empty directions (the axis) are left out.
-struct AlgebraicCentre {
-  bool found = false;
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero(); // relative to the mean
-  double radius = 0.0;
-};
-
-AlgebraicCentre
-algebraicCentre(const kernel::Points& points,
-                const Scatter& scatter,
-                const Eigen::Matrix3d& projector)
+std::optional<AlgebraicCentre>
+algebraicCentre(const StartRequest& request, const Eigen::Matrix3d& projector)
 {
+  const auto& channel = request.points.channel;
   Eigen::Matrix4d A = Eigen::Matrix4d::Zero();
   Eigen::Vector4d b = Eigen::Vector4d::Zero();
-  for (int i = 0; i < scatter.count; ++i) {
-    const Eigen::Vector3d q(points.channel[0][i],
-                            points.channel[1][i],
-                            points.channel[2][i]);
+  for (int i = 0; i < request.scatter.count; ++i) {
+    const Eigen::Vector3d q(channel[0][i], channel[1][i], channel[2][i]);
     Eigen::Vector4d row;
-    row << 2.0 * (projector * (q - scatter.mean)), 1.0;
+    row << 2.0 * (projector * (q - request.scatter.mean)), 1.0;
     A += row * row.transpose();
     b += row * (0.25 * row.head<3>().squaredNorm());
   }
@@ -116,118 +94,63 @@ algebraicCentre(const kernel::Points& points,
   const double size = A.topLeftCorner<3, 3>().trace();
   A.topLeftCorner<3, 3>() += size * (Eigen::Matrix3d::Identity() - projector);
   const Eigen::FullPivLU<Eigen::Matrix4d> lu(A);
-  AlgebraicCentre result;
   if (!lu.isInvertible())
-    return result;
+    return std::nullopt;
   const Eigen::Vector4d x = lu.solve(b);
   const double radius_squared = x[3] + x.head<3>().squaredNorm();
-  result.found = radius_squared > 0.0 && std::isfinite(radius_squared);
-  result.centre = x.head<3>();
-  result.radius = result.found ? std::sqrt(radius_squared) : 0.0;
-  return result;
+  if (!(radius_squared > 0.0) || !std::isfinite(radius_squared))
+    return std::nullopt;
+  return AlgebraicCentre{x.head<3>(), std::sqrt(radius_squared)};
 }
 
-// The surface with its frame where the principal normal, from the centre, leaves it;
-// the side on which the points are decides the sign of the curvature.
 UnboundedSurface
-surfaceFromCentre(Model model,
-                  const AlgebraicCentre& found,
-                  const Scatter& scatter,
-                  const Eigen::Vector3d& axis)
+surfaceAround(kernel::Model model,
+              const AlgebraicCentre& found,
+              const Eigen::Vector3d& mean,
+              const Eigen::Vector3d& z,
+              const Eigen::Vector3d& x)
 {
   UnboundedSurface surface;
   surface.model = model;
-  Eigen::Vector3d z = scatter.normal();
-  if (model == Model::Cylinder)
-    z -= axis * axis.dot(z);
-  z.normalize();
   // The mean lies on the far side of the centre, seen along z, when the surface is a
   // bowl.
   const double side = found.centre.dot(z) > 0.0 ? 1.0 : -1.0;
   surface.k = {side / found.radius, 0.0, 0.0};
-  surface.c = scatter.mean + found.centre - side * found.radius * z;
+  surface.c = mean + found.centre - side * found.radius * z;
   surface.R.col(2) = z;
-  surface.R.col(0) = model == Model::Cylinder ? axis : frameFromZ(z).col(0);
+  surface.R.col(0) = x;
   surface.R.col(1) = z.cross(surface.R.col(0));
   return surface;
 }
 
+namespace {
+
 double
-costOf(const UnboundedSurface& surface,
-       Residual residual,
-       const kernel::Points& points,
-       const Scatter& scatter)
+costOf(const UnboundedSurface& surface, const StartRequest& request)
 {
   kernel::NormalSums sums;
   kernel::kernel().accumulateNormal(surface.model,
-                                    residual,
-                                    points,
-                                    kernelState(surface, scatter),
+                                    request.residual,
+                                    request.points,
+                                    kernelState(surface, request.scatter),
                                     sums);
   return std::isfinite(sums.cost) ? sums.cost : std::numeric_limits<double>::max();
 }
 
-// Replaces `best` by an algebraic fit where that costs less.
-void
-tryAlgebraicStarts(Residual residual,
-                   const kernel::Points& points,
-                   const Scatter& scatter,
-                   UnboundedSurface& best)
-{
-  const bool cylinder = best.model == Model::Cylinder;
-  double lowest = costOf(best, residual, points, scatter);
-  for (int i = 0; i < (cylinder ? 3 : 1); ++i) {
-    const Eigen::Vector3d axis = scatter.axes.col(i);
-    // An axis along the normal leaves no direction for z.
-    if (cylinder && i == 2)
-      continue;
-    const Eigen::Matrix3d projector =
-        cylinder ?
-            Eigen::Matrix3d(Eigen::Matrix3d::Identity() - axis * axis.transpose()) :
-            Eigen::Matrix3d(Eigen::Matrix3d::Identity());
-    const AlgebraicCentre found = algebraicCentre(points, scatter, projector);
-    if (!found.found || !(found.radius > 0.0))
-      continue;
-    const UnboundedSurface candidate =
-        surfaceFromCentre(best.model, found, scatter, axis);
-    const double cost = costOf(candidate, residual, points, scatter);
-    if (cost < lowest) {
-      lowest = cost;
-      best = candidate;
-    }
-  }
-}
-
 } // namespace
 
-bool
-isThick(Model model, const Scatter& scatter)
-{
-  // A cap of half-angle t has eigenvalues in the ratio t^2/12 or so: beyond some 25
-  // degrees a height field misrepresents it.
-  constexpr double kThick = 0.015;
-  return (model == Model::Sphere || model == Model::Cylinder) &&
-         scatter.eigenvalues[0] > kThick * scatter.eigenvalues[2];
-}
+CheapestStart::CheapestStart(const StartRequest& request, const UnboundedSurface& first)
+: request_(request), best_(first), lowest_(costOf(first, request))
+{}
 
-UnboundedSurface
-surfaceStart(Model model,
-             Residual residual,
-             const kernel::Points& points,
-             const Scatter& scatter)
+void
+CheapestStart::consider(const UnboundedSurface& candidate)
 {
-  UnboundedSurface surface;
-  surface.model = model;
-  surface.R = scatter.axes;
-  surface.c = scatter.mean;
-  if (model == Model::Plane)
-    return surface;
-  surface = surfaceFromQuadric(model, leastSquaresQuadric(points, scatter), scatter);
-  if (model == Model::Cylinder)
-    alignCylinder(surface);
-  if (isThick(model, scatter))
-    tryAlgebraicStarts(residual, points, scatter, surface);
-  return surface;
+  const double cost = costOf(candidate, request_);
+  if (cost < lowest_) {
+    lowest_ = cost;
+    best_ = candidate;
+  }
 }
 
 } // namespace holdfast

@@ -548,24 +548,18 @@ writePatchPoints(std::ostream& out,
 std::array<std::uint8_t, 3>
 surfaceColor(SurfaceType surface)
 {
-  // Okabe and Ito's palette, which colour-blind people can tell apart.
-  switch (surface) {
-  case SurfaceType::Plane:
-    return {153, 153, 153};
-  case SurfaceType::Sphere:
-    return {240, 228, 66};
-  case SurfaceType::CircularCylinder:
-    return {204, 121, 167};
-  case SurfaceType::EllipticParaboloid:
-    return {0, 114, 178};
-  case SurfaceType::HyperbolicParaboloid:
-    return {213, 94, 0};
-  case SurfaceType::CylindricParaboloid:
-    return {0, 158, 115};
-  case SurfaceType::CircularParaboloid:
-    return {86, 180, 233};
-  }
-  throw std::invalid_argument("unknown surface type");
+  // Okabe and Ito's palette, which colour-blind people can tell apart; in the order of
+  // SurfaceType.
+  using Color = std::array<std::uint8_t, 3>;
+  constexpr std::array kColors{Color{153, 153, 153},
+                               Color{240, 228, 66},
+                               Color{204, 121, 167},
+                               Color{0, 114, 178},
+                               Color{213, 94, 0},
+                               Color{0, 158, 115},
+                               Color{86, 180, 233}};
+  static_assert(kColors.size() == kSurfaceTraits.size(), "every surface has a colour");
+  return kColors.at(static_cast<std::size_t>(surface));
 }
 
 } // namespace holdfast

@@ -133,19 +133,9 @@ Patch::pose() const
 Eigen::Vector2d
 Patch::principalCurvatures() const
 {
-  switch (type.surface) {
-  case SurfaceType::CircularCylinder:
-  case SurfaceType::CylindricParaboloid:
-    return {0.0, kappa.x()};
-  case SurfaceType::Sphere:
-  case SurfaceType::CircularParaboloid:
-    return {kappa.x(), kappa.x()};
-  case SurfaceType::Plane:
-  case SurfaceType::EllipticParaboloid:
-  case SurfaceType::HyperbolicParaboloid:
-    break;
-  }
-  return kappa;
+  const auto along = [this](int axis) { return axis == kStraight ? 0.0 : kappa[axis]; };
+  const SurfaceTraits& traits = traitsOf(type.surface);
+  return {along(traits.along_x), along(traits.along_y)};
 }
 
 Eigen::Vector3d

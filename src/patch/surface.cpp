@@ -13,19 +13,13 @@ namespace {
 // rounding.
 constexpr double kEquatorTolerance = 1e-12;
 
-bool
-isRound(SurfaceType surface)
-{
-  return surface == SurfaceType::Sphere || surface == SurfaceType::CircularCylinder;
-}
-
 // Square of the height above the equatorial plane, in radii, on the sheet through the
 // centre: 1 at the centre, 0 at the equator, negative beyond.
 double
 squaredElevation(const Patch& patch, double x, double y)
 {
-  const double across =
-      patch.type.surface == SurfaceType::Sphere ? std::hypot(x, y) : y;
+  const bool straight = traitsOf(patch.type.surface).along_x == kStraight;
+  const double across = straight ? y : std::hypot(x, y);
   const double ratio = patch.kappa.x() * across;
   return 1.0 - ratio * ratio;
 }
@@ -59,7 +53,7 @@ bool
 isOnPatch(const Patch& patch, const Eigen::Vector3d& local)
 {
   // On the sheet through the centre the local normal has no component against z.
-  if (isRound(patch.type.surface) &&
+  if (traitsOf(patch.type.surface).is_round &&
       patch.kappa.x() * local.z() > 1.0 + kEquatorTolerance)
     return false;
   return contains(patch, local.head<2>());
@@ -71,7 +65,7 @@ Eigen::Vector3d
 implicitDiagonal(const Patch& patch)
 {
   const Eigen::Vector2d k = patch.principalCurvatures();
-  return {k.x(), k.y(), isRound(patch.type.surface) ? patch.kappa.x() : 0.0};
+  return {k.x(), k.y(), traitsOf(patch.type.surface).is_round ? patch.kappa.x() : 0.0};
 }
 
 double
@@ -93,7 +87,7 @@ height(const Patch& patch, double x, double y)
 {
   const Eigen::Vector2d k = patch.principalCurvatures();
   const double parabola = k.x() * x * x + k.y() * y * y;
-  if (!isRound(patch.type.surface))
+  if (!traitsOf(patch.type.surface).is_round)
     return 0.5 * parabola;
   const double squared = squaredElevation(patch, x, y);
   if (squared < -kEquatorTolerance)

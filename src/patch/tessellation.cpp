@@ -21,11 +21,11 @@ struct Ring {
 Patch
 withinEquator(Patch patch)
 {
-  const double radius = 1.0 / std::abs(patch.kappa.x());
-  if (patch.type.surface == SurfaceType::Sphere)
-    patch.d(0) = std::min(patch.d(0), radius);
-  if (patch.type.surface == SurfaceType::CircularCylinder)
-    patch.d(1) = std::min(patch.d(1), radius);
+  if (!traitsOf(patch.type.surface).is_round)
+    return patch;
+  // Across the axis: the circle's radius, the rectangle's second half length.
+  double& across = patch.d(boundaryParameterCount(patch.type.boundary) - 1);
+  across = std::min(across, 1.0 / std::abs(patch.kappa.x()));
   return patch;
 }
 

@@ -13,28 +13,13 @@ isLegal(PatchType type)
 BoundaryType
 defaultBoundary(SurfaceType surface)
 {
-  switch (surface) {
-  case SurfaceType::Sphere:
-  case SurfaceType::CircularParaboloid:
-    return BoundaryType::Circle;
-  case SurfaceType::CircularCylinder:
-  case SurfaceType::CylindricParaboloid:
-    return BoundaryType::Rectangle;
-  case SurfaceType::Plane:
-  case SurfaceType::EllipticParaboloid:
-  case SurfaceType::HyperbolicParaboloid:
-    break;
-  }
-  return BoundaryType::Ellipse;
+  return traitsOf(surface).boundary;
 }
 
 bool
 isParaboloid(SurfaceType surface)
 {
-  return surface == SurfaceType::EllipticParaboloid ||
-         surface == SurfaceType::HyperbolicParaboloid ||
-         surface == SurfaceType::CylindricParaboloid ||
-         surface == SurfaceType::CircularParaboloid;
+  return traitsOf(surface).is_paraboloid;
 }
 
 bool
@@ -62,19 +47,7 @@ boundaryParameterCount(BoundaryType boundary)
 int
 curvatureParameterCount(SurfaceType surface)
 {
-  switch (surface) {
-  case SurfaceType::Plane:
-    return 0;
-  case SurfaceType::EllipticParaboloid:
-  case SurfaceType::HyperbolicParaboloid:
-    return 2;
-  case SurfaceType::Sphere:
-  case SurfaceType::CircularCylinder:
-  case SurfaceType::CylindricParaboloid:
-  case SurfaceType::CircularParaboloid:
-    break;
-  }
-  return 1;
+  return traitsOf(surface).curvatures;
 }
 
 int

@@ -15,7 +15,7 @@ namespace holdfast {
 constexpr auto
 surfaceRequestNames()
 {
-  constexpr std::size_t kOpen = 2;
+  constexpr std::size_t kOpen = kOpenRequests;
   std::array<std::string_view, kOpen + kSurfaceNames.words.size()> words{"auto",
                                                                          "paraboloid"};
   for (std::size_t i = 0; i < kSurfaceNames.words.size(); ++i)
@@ -24,11 +24,6 @@ surfaceRequestNames()
 }
 
 inline constexpr auto kSurfaceRequestNames = surfaceRequestNames();
-static_assert(kSurfaceRequestNames.of(SurfaceRequest::Plane) ==
-                      kSurfaceNames.of(SurfaceType::Plane) &&
-                  kSurfaceRequestNames.of(SurfaceRequest::CircularParaboloid) ==
-                      kSurfaceNames.of(SurfaceType::CircularParaboloid),
-              "requests follow the order of the surfaces");
 
 inline constexpr EnumNames<Residual, 2> kResidualNames{{"sampson", "ray"}};
 

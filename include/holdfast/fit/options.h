@@ -26,6 +26,30 @@ enum class SurfaceRequest : std::uint8_t {
   CircularParaboloid
 };
 
+/// How many requests leave the type to the data; the others follow in the order of the
+/// surfaces.
+inline constexpr int kOpenRequests = 2;
+
+constexpr SurfaceRequest
+requestFor(SurfaceType surface)
+{
+  return static_cast<SurfaceRequest>(kOpenRequests + static_cast<int>(surface));
+}
+static_assert(requestFor(SurfaceType::Plane) == SurfaceRequest::Plane &&
+                  requestFor(SurfaceType::CircularParaboloid) ==
+                      SurfaceRequest::CircularParaboloid,
+              "requests follow the order of the surfaces");
+
+/// The type that is forced; none for Auto and Paraboloid.
+constexpr std::optional<SurfaceType>
+surfaceOf(SurfaceRequest request)
+{
+  const int surface = static_cast<int>(request) - kOpenRequests;
+  if (surface < 0)
+    return std::nullopt;
+  return static_cast<SurfaceType>(surface);
+}
+
 /// The residual that is minimised, as a function of the implicit form f(q), its
 /// gradient g and the covariance Sigma of the point.
 enum class Residual : std::uint8_t {

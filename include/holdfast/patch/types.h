@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string_view>
@@ -50,6 +51,39 @@ inline constexpr std::array<PatchType, 10> kPatchTypes{{
     {SurfaceType::Sphere, BoundaryType::Circle},
     {SurfaceType::CircularCylinder, BoundaryType::Rectangle},
 }};
+
+/// What a surface is, apart from how it is fitted.
+struct SurfaceTraits {
+  BoundaryType boundary; ///< that it implies; a plane may have any
+  int curvatures; ///< number of curvature parameters
+  /// Which of the curvature parameters is the curvature along x and y; kStraight: none.
+  int along_x, along_y;
+  bool is_paraboloid;
+  bool is_round; ///< closes around its centre or axis, with an equator as its end
+};
+
+inline constexpr int kStraight = -1;
+
+/// In the order of SurfaceType.
+inline constexpr std::array<SurfaceTraits, 7> kSurfaceTraits{{
+    {BoundaryType::Ellipse, 0, kStraight, kStraight, false, false}, // plane
+    {BoundaryType::Circle, 1, 0, 0, false, true}, // sphere
+    {BoundaryType::Rectangle, 1, kStraight, 0, false, true}, // circular cylinder
+    {BoundaryType::Ellipse, 2, 0, 1, true, false}, // elliptic paraboloid
+    {BoundaryType::Ellipse, 2, 0, 1, true, false}, // hyperbolic paraboloid
+    {BoundaryType::Rectangle, 1, kStraight, 0, true, false}, // cylindric paraboloid
+    {BoundaryType::Circle, 1, 0, 0, true, false}, // circular paraboloid
+}};
+static_assert(kSurfaceTraits.size() ==
+                  static_cast<std::size_t>(SurfaceType::CircularParaboloid) + 1,
+              "every surface has its traits");
+
+/// \throw std::out_of_range for what is not in the enumeration.
+constexpr const SurfaceTraits&
+traitsOf(SurfaceType surface)
+{
+  return kSurfaceTraits.at(static_cast<std::size_t>(surface));
+}
 
 /// Most parameters any type has: the plane bounded by a convex quad.
 inline constexpr int kMaxParameters = 11;
