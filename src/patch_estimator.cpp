@@ -10,6 +10,29 @@ struct PatchEstimator::Impl {
   CovarianceMode mode;
 };
 
+namespace {
+
+void
+attach(const PatchFit& fit,
+       const PatchCovariance& uncertainty,
+       CovarianceMode mode,
+       FitResult& result)
+{
+  result.chi2_expected = expectedChi2(fit);
+  result.status = statusOf(fit, uncertainty);
+  if (!isUsable(result.status))
+    return;
+  const Linearity linearity = linearityOf(fit, uncertainty, mode);
+  result.flags = linearity.flags;
+  result.nonlinearity = linearity.nonlinearity;
+  result.state_covariance = uncertainty.state;
+  result.state_mean_shift = uncertainty.state_shift;
+  result.covariance = uncertainty.parameters;
+  result.mean_shift = uncertainty.shift;
+}
+
+} // namespace
+
 PatchEstimator::PatchEstimator(const FitOptions& options, CovarianceMode mode)
 : impl_(std::make_shared<const Impl>(Impl{PatchFitter(options), mode}))
 {}
@@ -21,6 +44,7 @@ PatchEstimator::estimate(PointBatch& batch) const
   FitResult result;
   result.status = fit.status;
   result.patch = fit.bounded.patch;
+  result.state = fit.bounded.state;
   result.chi2 = 2.0 * fit.surface.cost;
   result.chi2_dof = fit.points - kernel::parameterCount(fit.surface.surface.model);
   result.points = fit.points;
@@ -32,12 +56,7 @@ PatchEstimator::estimate(PointBatch& batch) const
   if (fit.status == FitStatus::Converged) {
     const PatchCovariance uncertainty =
         patchCovariance(fit, batch, impl_->fitter, impl_->mode);
-    result.chi2_expected = expectedChi2(fit);
-    result.covariance = uncertainty.covariance;
-    result.mean_shift = uncertainty.mean_shift;
-    result.status = observability(fit, result.covariance);
-    if (!isUsable(result.status))
-      result.covariance.resize(0, 0);
+    attach(fit, uncertainty, impl_->mode, result);
   }
   return result;
 }

@@ -19,15 +19,24 @@ randomExtracted(Random& random, PatchType type)
 {
   ExtractedPatch extracted;
   FitResult& fit = extracted.fit;
-  fit.status = FitStatus::AxisNotObservable;
+  fit.status = FitStatus::Converged;
   fit.patch = test::randomPatch(random, type);
   const int n = degreesOfFreedom(type);
   fit.covariance.resize(n, n);
   for (int i = 0; i < n; ++i)
     for (int j = 0; j <= i; ++j)
       fit.covariance(i, j) = fit.covariance(j, i) = 1e-5 * random.normal();
+  fit.state = toState(fit.patch, FitOptions{}.containment);
+  const Eigen::Index m = stateLayoutOf(type).size();
+  fit.state_covariance.resize(m, m);
+  for (Eigen::Index i = 0; i < m; ++i)
+    for (Eigen::Index j = 0; j <= i; ++j)
+      fit.state_covariance(i, j) = fit.state_covariance(j, i) = 1e-5 * random.normal();
+  fit.flags.curvature_not_observable = true;
+  fit.nonlinearity = random.uniform(0.0, 0.1);
   fit.chi2 = random.uniform(50.0, 150.0);
   fit.chi2_dof = 94;
+  fit.chi2_expected = 83.5;
   fit.points = 100;
   Validation& validation = extracted.validation.emplace();
   validation.verdict = PatchVerdict::Accepted;

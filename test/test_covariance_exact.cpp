@@ -18,37 +18,49 @@ class CovarianceExact : public testing::TestWithParam<PatchType> {};
 constexpr double kTolerance = 1e-6;
 constexpr double kStepSigma = 3e-4;
 
-// The parameters of a patch fitted to the sample, with the batch's origin held fixed so
-// that coordinates round alike.
-ParameterVector
-refit(const PatchEstimator& estimator, const Sample& sample, PointBatch& batch)
+// Parameters, then the coordinates of the state about a reference.
+using Coordinates = Eigen::VectorXd;
+
+// Parameters and state of a patch fitted to the sample, with the batch's origin held
+// fixed so that coordinates round alike.
+Coordinates
+refit(const PatchEstimator& estimator,
+      const Sample& sample,
+      const PatchState& reference,
+      PointBatch& batch)
 {
   const Eigen::Vector3d origin = batch.origin();
   batch.clear(origin, sample.viewpoint);
   for (std::size_t i = 0; i < sample.points.size(); ++i)
     batch.add(sample.points[i], sample.covariances[i]);
-  return pack(estimator.estimate(batch).patch);
+  const FitResult fit = estimator.estimate(batch);
+  const ParameterVector parameters = pack(fit.patch);
+  const StateVector state = difference(fit.state, reference);
+  Coordinates both(parameters.size() + state.size());
+  both << parameters, state;
+  return both;
 }
 
 // sum_i G_i Sigma_i G_i^T with G_i by central differences.
-ParameterMatrix
+Eigen::MatrixXd
 differencedCovariance(const Sample& sample, FitOptions options)
 {
   options.polish_tolerance_sigma = 1e-10;
   const PatchEstimator estimator(options);
   Sample moved = sample;
   PointBatch batch = test::batchOf(sample);
-  const Eigen::Index n = refit(estimator, sample, batch).size();
-  ParameterMatrix covariance = ParameterMatrix::Zero(n, n);
+  const PatchState reference = estimator.estimate(batch).state;
+  const Eigen::Index n = refit(estimator, sample, reference, batch).size();
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(n, n);
   for (std::size_t i = 0; i < sample.points.size(); ++i) {
     const Eigen::Matrix3d& S = sample.covariances[i];
     const double step = kStepSigma * std::sqrt(S.trace());
     Eigen::MatrixXd G(n, 3);
     for (int k = 0; k < 3; ++k) {
       moved.points[i][k] = sample.points[i][k] + step;
-      const ParameterVector ahead = refit(estimator, moved, batch);
+      const Coordinates ahead = refit(estimator, moved, reference, batch);
       moved.points[i][k] = sample.points[i][k] - step;
-      G.col(k) = (ahead - refit(estimator, moved, batch)) / (2.0 * step);
+      G.col(k) = (ahead - refit(estimator, moved, reference, batch)) / (2.0 * step);
       moved.points[i][k] = sample.points[i][k];
     }
     covariance += G * S * G.transpose();
@@ -70,8 +82,14 @@ expectExact(const Sample& sample, FitOptions options)
 {
   const FitResult result = fitted(sample, options);
   ASSERT_TRUE(isUsable(result.status)) << statusName(result.status);
-  EXPECT_LT(test::normalizedDifference(result.covariance,
-                                       differencedCovariance(sample, options)),
+  const Eigen::MatrixXd differenced = differencedCovariance(sample, options);
+  const Eigen::Index n = result.covariance.rows(), m = result.state_covariance.rows();
+  EXPECT_LT(
+      test::normalizedDifference(result.covariance, differenced.topLeftCorner(n, n)),
+      kTolerance)
+      << sample.points.size() << " points";
+  EXPECT_LT(test::normalizedDifference(result.state_covariance,
+                                       differenced.bottomRightCorner(m, m)),
             kTolerance)
       << sample.points.size() << " points, chi2/dof " << result.chi2 / result.chi2_dof;
 }

@@ -57,8 +57,17 @@ someReport()
     for (int i = 0; i < n; ++i)
       for (int j = 0; j <= i; ++j)
         fit.covariance(i, j) = fit.covariance(j, i) = 1e-5 * random.normal();
+    fit.state = toState(fit.patch, FitOptions{}.containment);
+    const int m = stateLayoutOf(type).size();
+    fit.state_covariance.resize(m, m);
+    for (int i = 0; i < m; ++i)
+      for (int j = 0; j <= i; ++j)
+        fit.state_covariance(i, j) = fit.state_covariance(j, i) =
+            1e-5 * random.normal();
+    fit.nonlinearity = random.uniform(0.0, 0.1);
     fit.chi2 = random.uniform(0.0, 100.0);
     fit.chi2_dof = 94;
+    fit.chi2_expected = random.uniform(80.0, 94.0);
     fit.points = 100;
     fit.iterations = 5;
     extracted.seed_index = 17;
@@ -97,6 +106,12 @@ TEST(PatchIo, JsonComesBackBitForBit)
       EXPECT_EQ(a.fit.patch.type, b.fit.patch.type);
       EXPECT_EQ(pack(a.fit.patch), pack(b.fit.patch));
       EXPECT_EQ(a.fit.covariance, b.fit.covariance);
+      EXPECT_EQ(pack(a.fit.state), pack(b.fit.state));
+      EXPECT_LT((a.fit.state.normal - b.fit.state.normal).norm(), 1e-15);
+      EXPECT_EQ(a.fit.state_covariance, b.fit.state_covariance);
+      EXPECT_EQ(a.fit.flags.axis_not_observable, b.fit.flags.axis_not_observable);
+      EXPECT_EQ(a.fit.nonlinearity, b.fit.nonlinearity);
+      EXPECT_EQ(a.fit.chi2_expected, b.fit.chi2_expected);
       EXPECT_EQ(a.fit.chi2, b.fit.chi2);
       EXPECT_EQ(a.fit.points, b.fit.points);
       EXPECT_EQ(a.fit.status, b.fit.status);
@@ -144,12 +159,19 @@ TEST(PatchIo, JsonHasTheDocumentedMembers)
                                       "names",
                                       "parameters",
                                       "covariance",
+                                      "flags",
+                                      "nonlinearity",
+                                      "state",
+                                      "state_names",
+                                      "state_covariance",
+                                      "state_frame",
                                       "covariance_mode",
                                       "status",
                                       "points",
                                       "uninformative_points",
                                       "chi2",
                                       "chi2_dof",
+                                      "chi2_expected",
                                       "iterations",
                                       "residual",
                                       "coverage",

@@ -24,7 +24,8 @@ const std::vector<std::string> kScenes{"table2",
                                        "robot-0.8",
                                        "robot-1.0",
                                        "robot-1.2",
-                                       "random"};
+                                       "random",
+                                       "sweep"};
 
 // Options by name: all departures from the paper, none, or all but one.
 struct OptionSet {
@@ -101,6 +102,20 @@ largest(const std::vector<double>& values)
 }
 
 Json
+columnsJson(const std::vector<ConsistencyColumn>& columns)
+{
+  Json json = Json::array();
+  for (const ConsistencyColumn& column : columns)
+    json.push_back(
+        {{"up_to", std::isfinite(column.up_to) ? Json(column.up_to) : Json()},
+         {"trials", column.trials},
+         {"state_nees_per_dof", column.state_nees_per_dof},
+         {"state_coverage95", column.state_coverage95},
+         {"nees_per_dof", column.nees_per_dof}});
+  return json;
+}
+
+Json
 rowOf(const std::string& scene,
       PatchType type,
       CovarianceMode mode,
@@ -122,6 +137,11 @@ rowOf(const std::string& scene,
           {"sigma_ratio_min", any ? Json(*range.first) : Json()},
           {"sigma_ratio_max", any ? Json(*range.second) : Json()},
           {"bias_after_shift_max", largest(result.bias_after_shift_sigma)},
+          {"state_nees_per_dof", result.state_nees_per_dof},
+          {"state_coverage95", result.state_coverage95},
+          {"unflagged_nees_per_dof", result.unflagged_nees_per_dof},
+          {"unflagged_rate", result.unflagged_rate},
+          {"by_nonlinearity", columnsJson(result.by_nonlinearity)},
           {"type_error_rate",
            isParaboloid(type.surface) || (type.surface == SurfaceType::Plane &&
                                           type.boundary == BoundaryType::Ellipse) ?
@@ -172,6 +192,36 @@ casesOf(const ConsistencyChoice& choice)
   return cases;
 }
 
+// Many views nobody chose, a few trials each. Views in which the points do not
+// determine the patch even without noise are drawn again.
+ConsistencyResult
+sweep(PatchType type,
+      std::size_t type_index,
+      const NoiseModel& noise,
+      const ConsistencyOptions& options)
+{
+  constexpr int kTrialsPerView = 20;
+  std::mt19937_64 generator = trialGenerator(options.seed, type_index);
+  std::vector<ConsistencyResult> views;
+  const int wanted = std::max(1, options.trials / kTrialsPerView);
+  while (static_cast<int>(views.size()) < wanted) {
+    const ReferenceScene scene = randomScene(type, generator);
+    ConsistencyOptions few = options;
+    few.trials = kTrialsPerView;
+    few.seed = generator();
+    few.progress = nullptr;
+    if (options.progress)
+      options.progress(static_cast<int>(views.size()), wanted);
+    try {
+      views.push_back(checkConsistency(scene.scene, scene.rays, noise, few));
+    }
+    catch (const std::invalid_argument&) {
+      continue;
+    }
+  }
+  return pooled(views);
+}
+
 Report
 runConsistency(const ConsistencyChoice& choice, const ExperimentSettings& settings)
 {
@@ -181,8 +231,6 @@ runConsistency(const ConsistencyChoice& choice, const ExperimentSettings& settin
   for (std::size_t i = 0; i < cases.size(); ++i) {
     const Case& one = cases[i];
     const PatchType type = kPatchTypes[one.type_index];
-    const ReferenceScene scene =
-        sceneOf(one.scene, type, one.type_index, settings.seed);
     ConsistencyOptions options;
     options.fit = one.options.fit;
     options.mode = one.mode;
@@ -194,18 +242,24 @@ runConsistency(const ConsistencyChoice& choice, const ExperimentSettings& settin
     options.progress = stageProgress(settings.progress,
                                      static_cast<int>(i),
                                      static_cast<int>(cases.size()));
-    report.rows.push_back(
-        rowOf(one.scene,
-              type,
-              one.mode,
-              one.options.name,
-              checkConsistency(scene.scene, scene.rays, *noise, options)));
+    const auto check = [&] {
+      if (one.scene == "sweep")
+        return sweep(type, one.type_index, *noise, options);
+      const ReferenceScene scene =
+          sceneOf(one.scene, type, one.type_index, settings.seed);
+      return checkConsistency(scene.scene, scene.rays, *noise, options);
+    };
+    report.rows.push_back(rowOf(one.scene, type, one.mode, one.options.name, check()));
   }
   report.columns = {{"scene", "scene"},
                     {"type", "type"},
                     {"mode", "mode"},
                     {"options", "options"},
                     {"N", "points"},
+                    {"state NEES/dof", "state_nees_per_dof"},
+                    {"state 95 %", "state_coverage95"},
+                    {"unflagged", "unflagged_nees_per_dof"},
+                    {"share", "unflagged_rate"},
                     {"NEES/dof", "nees_per_dof"},
                     {"about mean", "nees_per_dof_about_mean"},
                     {"95 %", "coverage95"},

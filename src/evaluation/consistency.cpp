@@ -9,7 +9,9 @@
 #include <boost/math/distributions/chi_squared.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 namespace holdfast {
@@ -96,7 +98,20 @@ struct Trial {
   // shift, where there is one, lies off the reference by error + shift.
   ParameterVector error, shift;
   ParameterMatrix covariance;
+  // The same of the state, about the estimate and in its frame.
+  StateVector state_error;
+  StateMatrix state_covariance;
+  double nonlinearity = 0.0;
+  bool flagged = false;
 };
+
+constexpr std::array kColumnEdges{0.01,
+                                  0.03,
+                                  0.1,
+                                  0.3,
+                                  1.0,
+                                  3.0,
+                                  std::numeric_limits<double>::infinity()};
 
 // x^T S^+ x and the rank of S.
 struct Mahalanobis {
@@ -147,8 +162,9 @@ public:
     return PatchEstimator(options, mode).estimate(batch);
   }
 
-  Trial run(int index, const Patch& reference) const
+  Trial run(int index, const FitResult& noise_free) const
   {
+    const Patch& reference = noise_free.patch;
     // A turn of more than this is a change of representation, not an error.
     constexpr double kSwitched = 0.785;
     std::mt19937_64 generator =
@@ -168,6 +184,12 @@ public:
     trial.shift = fit.mean_shift.size() > 0 ? tangentShift(fit.patch, fit.mean_shift) :
                                               ParameterVector::Zero(trial.error.size());
     trial.covariance = toTangent(fit.patch, fit.covariance);
+    trial.state_error = -difference(noise_free.state, fit.state);
+    if (fit.state_mean_shift.size() > 0)
+      trial.state_error += fit.state_mean_shift;
+    trial.state_covariance = fit.state_covariance;
+    trial.nonlinearity = fit.nonlinearity;
+    trial.flagged = fit.flags.any();
     const ParameterLayout layout = layoutOf(type_);
     const double turn = layout.r_count == 3 ? trial.error[layout.r() + 2] : 0.0;
     trial.outcome =
@@ -205,7 +227,7 @@ private:
 
 std::vector<Trial>
 runTrials(const TrialRunner& runner,
-          const Patch& reference,
+          const FitResult& reference,
           const ConsistencyOptions& options)
 {
   std::vector<Trial> trials(static_cast<std::size_t>(options.trials));
@@ -273,7 +295,111 @@ summarize(const std::vector<Trial>& trials, ConsistencyResult& result)
   result.bias_after_shift_sigma = result.bias_sigma;
 }
 
+// Squared error over the rank of its covariance, and whether the 95 % ellipsoid has it.
+struct Normalized {
+  double nees_per_dof = 0.0;
+  bool within = false;
+};
+
+Normalized
+normalized(const ParameterVector& error, const ParameterMatrix& covariance)
+{
+  const Mahalanobis m = mahalanobis(error, covariance);
+  const boost::math::chi_squared chi2(m.rank);
+  return {m.squared / m.rank, m.squared <= boost::math::quantile(chi2, 0.95)};
+}
+
+// A running mean.
+void
+average(double& mean, double value, int count)
+{
+  mean += (value - mean) / count;
+}
+
+void
+summarizeStates(const std::vector<Trial>& trials, ConsistencyResult& result)
+{
+  for (const double edge : kColumnEdges)
+    result.by_nonlinearity.push_back({edge, 0, 0.0, 0.0, 0.0});
+  std::array<int, kColumnEdges.size()> with_parameters{};
+  int usable = 0, unflagged = 0;
+  for (const Trial& trial : trials) {
+    if (trial.outcome == Trial::Outcome::Failed)
+      continue;
+    ++usable;
+    const Normalized state = normalized(trial.state_error, trial.state_covariance);
+    average(result.state_nees_per_dof, state.nees_per_dof, usable);
+    average(result.state_coverage95, state.within, usable);
+    const auto at = static_cast<std::size_t>(
+        std::lower_bound(kColumnEdges.begin(), kColumnEdges.end(), trial.nonlinearity) -
+        kColumnEdges.begin());
+    ConsistencyColumn& column =
+        result.by_nonlinearity[std::min(at, kColumnEdges.size() - 1)];
+    ++column.trials;
+    average(column.state_nees_per_dof, state.nees_per_dof, column.trials);
+    average(column.state_coverage95, state.within, column.trials);
+    if (trial.outcome == Trial::Outcome::Switched)
+      continue;
+    const Normalized parameters =
+        normalized(trial.error + trial.shift, trial.covariance);
+    average(column.nees_per_dof, parameters.nees_per_dof, ++with_parameters[at]);
+    if (!trial.flagged)
+      average(result.unflagged_nees_per_dof, parameters.nees_per_dof, ++unflagged);
+  }
+  result.unflagged_rate = usable > 0 ? static_cast<double>(unflagged) / usable : 0.0;
+}
+
 } // namespace
+
+ConsistencyResult
+pooled(const std::vector<ConsistencyResult>& results)
+{
+  ConsistencyResult all;
+  double points = 0.0;
+  int usable = 0, unflagged = 0;
+  for (const double edge : kColumnEdges)
+    all.by_nonlinearity.push_back({edge, 0, 0.0, 0.0, 0.0});
+  const auto add = [](double& mean, int& count, double other, int more) {
+    count += more;
+    if (count > 0)
+      mean += (other - mean) * more / count;
+  };
+  for (const ConsistencyResult& one : results) {
+    int before = all.trials;
+    const auto addRate = [&](double& mean, double other) {
+      int count = before;
+      add(mean, count, other, one.trials);
+    };
+    addRate(points, one.points);
+    addRate(all.nees_per_dof, one.nees_per_dof);
+    addRate(all.nees_per_dof_about_mean, one.nees_per_dof_about_mean);
+    addRate(all.coverage95, one.coverage95);
+    addRate(all.type_error_rate, one.type_error_rate);
+    addRate(all.switch_rate, one.switch_rate);
+    addRate(all.failure_rate, one.failure_rate);
+    all.trials += one.trials;
+    const int used =
+        static_cast<int>(std::lround((1.0 - one.failure_rate) * one.trials));
+    int count = usable;
+    add(all.state_nees_per_dof, count, one.state_nees_per_dof, used);
+    add(all.state_coverage95, usable, one.state_coverage95, used);
+    add(all.unflagged_nees_per_dof,
+        unflagged,
+        one.unflagged_nees_per_dof,
+        static_cast<int>(std::lround(one.unflagged_rate * used)));
+    for (std::size_t i = 0; i < kColumnEdges.size(); ++i) {
+      ConsistencyColumn& column = all.by_nonlinearity[i];
+      const ConsistencyColumn& other = one.by_nonlinearity[i];
+      int of_state = column.trials, of_coverage = column.trials;
+      add(column.state_nees_per_dof, of_state, other.state_nees_per_dof, other.trials);
+      add(column.state_coverage95, of_coverage, other.state_coverage95, other.trials);
+      add(column.nees_per_dof, column.trials, other.nees_per_dof, other.trials);
+    }
+  }
+  all.points = static_cast<int>(std::lround(points));
+  all.unflagged_rate = usable > 0 ? static_cast<double>(unflagged) / usable : 0.0;
+  return all;
+}
 
 ConsistencyResult
 checkConsistency(const Scene& scene,
@@ -300,8 +426,9 @@ checkConsistency(const Scene& scene,
                                 std::string(statusName(reference.status)));
   ConsistencyResult result;
   result.points = reference.points;
-  const std::vector<Trial> trials = runTrials(runner, reference.patch, options);
+  const std::vector<Trial> trials = runTrials(runner, reference, options);
   summarize(trials, result);
+  summarizeStates(trials, result);
   const ParameterVector shift = tangentShift(reference.patch, reference.mean_shift);
   for (std::size_t i = 0; i < result.bias_sigma.size(); ++i) {
     const double predicted = std::sqrt(toTangent(reference.patch, reference.covariance)

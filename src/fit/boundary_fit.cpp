@@ -445,6 +445,144 @@ boundPlane(const BoundRequest& request,
   return out;
 }
 
+BoundedPatch
+boundPlaced(const BoundRequest& request,
+            const BoundSettings& settings,
+            const Placement& placed)
+{
+  const bool flat = curvatureParameterCount(request.type.surface) == 0;
+  if (isRevolute(request.type))
+    return flat ? boundPlaneCircle(request, settings, placed) :
+                  boundRevolute(request, settings, placed);
+  if (flat)
+    return boundPlane(request, settings, placed);
+  return isParaboloid(request.type.surface) ?
+             boundTwoCurvatures(request, settings, placed) :
+             boundCylinder(request, settings, placed);
+}
+
+// The curvature matrix in the axes of the placement, with its rows.
+CurvatureMap
+placedCurvature(const UnboundedSurface& surface)
+{
+  CurvatureMap map;
+  const Eigen::Matrix3d shares =
+      withModel(surface.model, [](auto m) { return m.curvatureMatrix(); });
+  const Eigen::Vector3d entries = shares * surface.k;
+  map.xx = entries[0], map.xy = entries[1], map.yy = entries[2];
+  map.dxx.head<3>() = shares.row(0);
+  map.dxy.head<3>() = shares.row(1);
+  map.dyy.head<3>() = shares.row(2);
+  return map;
+}
+
+// K as a frame sees it that does not share the twist of the surface about its normal.
+void
+untwist(CurvatureMap& K, const Row& twist)
+{
+  K.dxx -= 2.0 * K.xy * twist;
+  K.dyy += 2.0 * K.xy * twist;
+  K.dxy += (K.xx - K.yy) * twist;
+}
+
+// A symmetric matrix and its rows in axes turned by V, from the old to the new: about
+// the normal, or a matrix that is the same in all axes.
+CurvatureMap
+turnedMap(const CurvatureMap& map, const Eigen::Matrix3d& V_and_tilt)
+{
+  const Eigen::Matrix3d V =
+      expMap({0.0, 0.0, -std::atan2(V_and_tilt(0, 1), V_and_tilt(0, 0))});
+  const Eigen::Vector3d entries(map.xx, map.xy, map.yy);
+  CurvatureMap turned = curvatureMap(entries, V);
+  Rows3 rows;
+  rows << map.dxx, map.dxy, map.dyy;
+  Eigen::Matrix3d T;
+  T << turned.dxx.head<3>(), turned.dxy.head<3>(), turned.dyy.head<3>();
+  const Rows3 turned_rows = T * rows;
+  turned.dxx = turned_rows.row(0);
+  turned.dxy = turned_rows.row(1);
+  turned.dyy = turned_rows.row(2);
+  return turned;
+}
+
+// Group of a state: one mean, or all three entries.
+void
+writeGroup(int at, int count, const CurvatureMap& map, PatchJacobian& jacobian)
+{
+  if (count == 1) {
+    jacobian.row(at) = 0.5 * (map.dxx + map.dyy);
+  }
+  else if (count == 3) {
+    jacobian.row(at) = map.dxx;
+    jacobian.row(at + 1) = map.dxy;
+    jacobian.row(at + 2) = map.dyy;
+  }
+}
+
+// Second moments about the centre of the patch.
+CurvatureMap
+momentsAboutCentre(const MomentFrame& f)
+{
+  const double x = f.mean.x(), y = f.mean.y();
+  CurvatureMap m;
+  m.xx = f.M(0, 0) + x * x, m.xy = f.M(0, 1) + x * y, m.yy = f.M(1, 1) + y * y;
+  m.dxx = f.dxx + 2.0 * x * f.dmean.row(0);
+  m.dyy = f.dyy + 2.0 * y * f.dmean.row(1);
+  m.dxy = f.dxy + x * f.dmean.row(1) + y * f.dmean.row(0);
+  return m;
+}
+
+// The paper's radius of round bounds is that of the larger moment (smooth: the mean of
+// both); so is the state's then, in the axes of the bound.
+void
+keepLarger(const BoundedPatch& bounded, double factor, int row, CurvatureMap& m)
+{
+  const double d = bounded.patch.d[0];
+  m.xx = m.yy = d * d / (factor * factor);
+  m.dxx = m.dyy = 2.0 * d / (factor * factor) * bounded.jacobian.row(row);
+}
+
+// The state, about the centre of the bounded patch. Its frame turns with the normal and
+// does not twist about it.
+void
+writeState(const BoundRequest& request,
+           const BoundSettings& settings,
+           const Placement& placed,
+           BoundedPatch& out)
+{
+  PatchState& state = out.state;
+  state.type = request.type;
+  state.normal = placed.z;
+  state.centre = out.patch.c;
+  const Eigen::Matrix3d frame = state.frame();
+  const Eigen::Matrix3d W = frame.transpose() * request.surface.R;
+  const int c = layoutOf(request.type).c();
+  Placement p{frame, out.patch.c - request.origin, placed.z};
+  p.delta = W * placed.delta;
+  p.gamma = frame.transpose() * out.jacobian.middleRows<3>(c);
+  CurvatureMap K = placedCurvature(request.surface);
+  untwist(K, p.delta.row(2));
+  p.delta.row(2).setZero();
+  K = turnedMap(K, frame.transpose() * placed.R);
+  CurvatureMap m = momentsAboutCentre(measureMoments(p, request.scatter, W));
+  const bool flat = curvatureParameterCount(request.type.surface) == 0;
+  if (isRevolute(request.type) && !settings.smooth_circle_radius)
+    keepLarger(out,
+               flat ? std::sqrt(2.0) * settings.factors.plane : settings.factors.lambda,
+               0,
+               m);
+  state.moments << m.xx, m.xy, m.yy;
+  if (!flat)
+    state.curvature << K.xx, K.xy, K.yy;
+  const StateLayout layout = stateLayoutOf(request.type);
+  PatchJacobian& jacobian = out.state_jacobian;
+  jacobian.resize(layout.size(), JointLayout::kSize);
+  writeGroup(0, layout.m_count, m, jacobian);
+  writeGroup(layout.k(), layout.k_count, K, jacobian);
+  jacobian.middleRows<2>(layout.nu()) = p.delta.topRows<2>();
+  jacobian.bottomRows<3>() = out.jacobian.middleRows<3>(c);
+}
+
 } // namespace
 
 ContainmentFactors
@@ -458,7 +596,10 @@ BoundedPatch
 boundPatch(const BoundRequest& request, const BoundSettings& settings)
 {
   const std::optional<Placement> placed = withModel(request.surface.model, [&](auto m) {
-    return m.place({request.surface, request.scatter, request.plane});
+    return m.place({request.surface,
+                    request.scatter,
+                    request.plane,
+                    settings.centre_on_normal_line});
   });
   if (!placed) {
     BoundedPatch out;
@@ -466,15 +607,9 @@ boundPatch(const BoundRequest& request, const BoundSettings& settings)
     out.status = FitStatus::Degenerate;
     return out;
   }
-  const bool flat = curvatureParameterCount(request.type.surface) == 0;
-  if (isRevolute(request.type))
-    return flat ? boundPlaneCircle(request, settings, *placed) :
-                  boundRevolute(request, settings, *placed);
-  if (flat)
-    return boundPlane(request, settings, *placed);
-  return isParaboloid(request.type.surface) ?
-             boundTwoCurvatures(request, settings, *placed) :
-             boundCylinder(request, settings, *placed);
+  BoundedPatch out = boundPlaced(request, settings, *placed);
+  writeState(request, settings, *placed, out);
+  return out;
 }
 
 } // namespace holdfast

@@ -3,11 +3,12 @@
 /// The bounds are functions of the projected points' moments, so the whole patch is a
 /// function of theta (the surface), of the nine moments s and, where the normal comes
 /// from a weighted plane, of that plane's theta. boundPatch() gives its value and its
-/// Jacobian.
+/// Jacobian, as a state and in the paper's parameters.
 #pragma once
 
 #include "placement.h"
 #include "surface_fit.h"
+#include <holdfast/patch/state.h>
 
 namespace holdfast {
 
@@ -33,6 +34,8 @@ struct BoundedPatch {
   FitStatus status = FitStatus::Converged;
   Patch patch;
   PatchJacobian jacobian;
+  PatchState state;
+  PatchJacobian state_jacobian; ///< d[M | k | nu | c] / d joint
 };
 
 /// What is to be bounded, for one call: it refers to what it is made of.
@@ -50,6 +53,7 @@ struct BoundRequest {
 struct BoundSettings {
   ContainmentFactors factors;
   bool smooth_circle_radius = true; ///< see FitOptions
+  bool centre_on_normal_line = true; ///< see FitOptions
 };
 
 /// Bounds a fitted surface as a patch of the requested type and brings it into

@@ -46,7 +46,8 @@ PatchFitter::PatchFitter(const FitOptions& options) : options_(options)
   if (!error.empty())
     throw std::invalid_argument(error);
   bound_settings_ = {ContainmentFactors::of(options.containment),
-                     options.smooth_circle_radius};
+                     options.smooth_circle_radius,
+                     options.centre_on_normal_line};
   thresholds_ = DiscriminationThresholds::atLevel(options.discrimination_level);
 }
 

@@ -12,6 +12,7 @@ FitOptions::paper()
   options.debias_scatter = false;
   options.noise_at_surface = false;
   options.normal_from_pca = false;
+  options.centre_on_normal_line = false;
   options.smooth_circle_radius = false;
   options.statistical_discrimination = false;
   return options;

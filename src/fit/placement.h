@@ -39,6 +39,7 @@ struct PlacementRequest {
   /// The weighted plane that gives sphere and cylinder their normal; null: the normal
   /// of the scatter.
   const UnboundedSurface* plane;
+  bool centre_on_normal_line; ///< see FitOptions
 };
 
 /// The normal that a surface takes over, in its axes.

@@ -16,6 +16,25 @@ hasCovariance(const FitResult& fit)
          fit.covariance.cols() == size;
 }
 
+bool
+hasState(const FitResult& fit)
+{
+  const int size = stateLayoutOf(fit.patch.type).size();
+  return isUsable(fit.status) && fit.state_covariance.rows() == size &&
+         fit.state_covariance.cols() == size;
+}
+
+// Of the centre; zero-sized when there is none.
+Eigen::MatrixXd
+centreCovariance(const FitResult& fit)
+{
+  if (hasState(fit))
+    return fit.state_covariance.bottomRightCorner<3, 3>();
+  if (hasCovariance(fit))
+    return fit.covariance.bottomRightCorner<3, 3>();
+  return {};
+}
+
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 } // namespace
@@ -33,9 +52,34 @@ isUsable(FitStatus status)
          status == FitStatus::CurvatureNotObservable;
 }
 
+ParameterMatrix
+observableCovariance(const FitResult& fit)
+{
+  ParameterMatrix S = fit.covariance;
+  const ParameterLayout layout = layoutOf(fit.patch.type);
+  if (S.rows() != layout.size())
+    return S;
+  const auto hide = [&S](int first, int count) {
+    S.middleRows(first, count).setConstant(kNaN);
+    S.middleCols(first, count).setConstant(kNaN);
+  };
+  const bool axis_lost = fit.flags.axis_not_observable ||
+                         (fit.patch.type.surface == SurfaceType::CircularCylinder &&
+                          fit.flags.curvature_not_observable);
+  if (axis_lost)
+    hide(0, layout.c());
+  else if (fit.flags.orientation_singular)
+    hide(layout.r(), layout.r_count);
+  return S;
+}
+
 double
 normalSigma(const FitResult& fit)
 {
+  if (hasState(fit)) {
+    const int nu = stateLayoutOf(fit.patch.type).nu();
+    return std::sqrt(fit.state_covariance.block<2, 2>(nu, nu).trace());
+  }
   if (!hasCovariance(fit))
     return kNaN;
   // A turn by delta about the local x and y axes moves the normal by as much.
@@ -47,19 +91,16 @@ normalSigma(const FitResult& fit)
 double
 centreSigma(const FitResult& fit)
 {
-  if (!hasCovariance(fit))
-    return kNaN;
-  return std::sqrt(fit.covariance.bottomRightCorner<3, 3>().trace());
+  const Eigen::MatrixXd centre = centreCovariance(fit);
+  return centre.size() > 0 ? std::sqrt(centre.trace()) : kNaN;
 }
 
 double
 centreSigma(const FitResult& fit, const Eigen::Vector3d& direction)
 {
-  if (!hasCovariance(fit))
-    return kNaN;
+  const Eigen::MatrixXd centre = centreCovariance(fit);
   const Eigen::Vector3d unit = direction.normalized();
-  const Eigen::Matrix3d centre = fit.covariance.bottomRightCorner<3, 3>();
-  return std::sqrt(unit.dot(centre * unit));
+  return centre.size() > 0 ? std::sqrt(unit.dot(centre * unit)) : kNaN;
 }
 
 double

@@ -37,6 +37,7 @@ vectorJson(const Eigen::MatrixBase<Derived>& v)
   return array;
 }
 
+/// What is not finite becomes null.
 Json
 matrixJson(const ParameterMatrix& m)
 {
@@ -190,6 +191,17 @@ optionsJson(const PatchReport& report)
           {"validation", validationJson(report.options.validation)}};
 }
 
+/// The names of those that are set.
+Json
+flagsJson(const FitFlags& flags)
+{
+  Json names = Json::array();
+  for (const auto& [name, flag] : kFitFlagNames)
+    if (flags.*flag)
+      names.push_back(name);
+  return names;
+}
+
 Json
 patchJson(const ExtractedPatch& extracted, const PatchReport& report)
 {
@@ -198,6 +210,8 @@ patchJson(const ExtractedPatch& extracted, const PatchReport& report)
   const CovarianceMode mode = report.options.covariance;
   Patch in_file = fit.patch;
   in_file.c += report.offset;
+  PatchState state = fit.state;
+  state.centre += report.offset;
   Json seed;
   if (extracted.seed_index)
     seed = {{"index", *extracted.seed_index},
@@ -207,7 +221,13 @@ patchJson(const ExtractedPatch& extracted, const PatchReport& report)
             {"dof", degreesOfFreedom(type)},
             {"names", parameterNames(type)},
             {"parameters", vectorJson(pack(in_file))},
-            {"covariance", matrixJson(fit.covariance)},
+            {"covariance", matrixJson(observableCovariance(fit))},
+            {"flags", flagsJson(fit.flags)},
+            {"nonlinearity", fit.nonlinearity},
+            {"state", vectorJson(pack(state))},
+            {"state_names", stateNames(type)},
+            {"state_covariance", matrixJson(fit.state_covariance)},
+            {"state_frame", matrixJson(state.frame())},
             {"covariance_mode", covarianceModeName(mode)},
             {"status", statusName(fit.status)},
             {"points", fit.points},
@@ -227,6 +247,8 @@ patchJson(const ExtractedPatch& extracted, const PatchReport& report)
   }
   if (mode == CovarianceMode::SecondOrder)
     json["mean_shift"] = vectorJson(fit.mean_shift);
+  if (mode == CovarianceMode::SecondOrder)
+    json["state_mean_shift"] = vectorJson(fit.state_mean_shift);
   return json;
 }
 
@@ -316,8 +338,43 @@ readNumbers(const Json& json, FitResult& fit)
   fit.patch = unpack(type, vector);
 }
 
+/// Files of former versions have neither state nor flags: there the state is that of
+/// the parameters, and no covariance of it is known.
+void
+readState(const Json& json, double containment, FitResult& fit)
+{
+  fit.state = toState(fit.patch, containment);
+  if (json.contains("flags"))
+    for (const Json& flag : json.at("flags"))
+      for (const FitFlagName& known : kFitFlagNames)
+        fit.flags.*known.flag = fit.flags.*known.flag || flag == known.name;
+  fit.nonlinearity = number(json.value("nonlinearity", Json(0.0)));
+  const Json rows = json.value("state_covariance", Json::array());
+  if (rows.empty())
+    return;
+  const auto n = static_cast<std::size_t>(stateLayoutOf(fit.patch.type).size());
+  const Json& values = json.at("state");
+  if (rows.size() != n || values.size() != n)
+    throw std::runtime_error("a state has the wrong size");
+  fit.state_covariance.resize(static_cast<Eigen::Index>(n),
+                              static_cast<Eigen::Index>(n));
+  StateVector x(static_cast<Eigen::Index>(n));
+  for (std::size_t i = 0; i < n; ++i) {
+    x[static_cast<Eigen::Index>(i)] = number(values.at(i));
+    if (rows.at(i).size() != n)
+      throw std::runtime_error("a covariance is not square");
+    for (std::size_t j = 0; j < n; ++j)
+      fit.state_covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
+          number(rows[i][j]);
+  }
+  Eigen::Vector3d normal;
+  for (std::size_t i = 0; i < 3; ++i)
+    normal[static_cast<Eigen::Index>(i)] = json.at("state_frame").at(i).at(2);
+  fit.state = unpackState(fit.patch.type, x, normal);
+}
+
 ExtractedPatch
-patchFromJson(const Json& json)
+patchFromJson(const Json& json, double containment)
 {
   ExtractedPatch extracted;
   FitResult& fit = extracted.fit;
@@ -331,6 +388,7 @@ patchFromJson(const Json& json)
   // Not in files of former versions, which knew independent errors only.
   fit.chi2_expected = json.value("chi2_expected", static_cast<double>(fit.chi2_dof));
   fit.iterations = json.at("iterations");
+  readState(json, containment, fit);
   if (const Json& seed = json.at("seed"); !seed.is_null()) {
     extracted.seed_index = seed.at("index").get<int>();
     for (Eigen::Index i = 0; i < 3; ++i)
@@ -475,14 +533,17 @@ readJson(const std::string& text)
     const Json json = Json::parse(text);
     PatchReport report;
     report.cloud = json.at("cloud");
+    const double containment =
+        json.at("options").value("containment", FitOptions{}.containment);
     // Files of earlier versions have none.
     if (const auto offset = json.find("offset"); offset != json.end())
       for (std::size_t i = 0; i < 3; ++i)
         report.offset(static_cast<Eigen::Index>(i)) = offset->at(i);
     for (const Json& patch : json.at("patches")) {
-      report.result.patches.push_back(patchFromJson(patch));
+      report.result.patches.push_back(patchFromJson(patch, containment));
       ExtractedPatch& read = report.result.patches.back();
       read.fit.patch.c -= report.offset;
+      read.fit.state.centre -= report.offset;
       if (read.seed_index)
         read.seed -= report.offset;
     }

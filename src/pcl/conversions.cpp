@@ -1,5 +1,7 @@
 #include <holdfast/pcl/conversions.h>
 
+#include <holdfast/fit/names.h>
+
 #include "zero_points.h"
 
 #include <holdfast/geometry/constants.h>
@@ -35,8 +37,55 @@ writeNumbers(const FitResult& fit, PatchPoint& point)
   std::transform(parameters.begin(), parameters.end(), point.parameters, [](double p) {
     return static_cast<float>(p);
   });
-  forUpperTriangle(fit.covariance.rows(), [&](auto i, auto j, int slot) {
-    point.parameter_covariance[slot] = static_cast<float>(fit.covariance(i, j));
+  const ParameterMatrix observable = observableCovariance(fit);
+  forUpperTriangle(observable.rows(), [&](auto i, auto j, int slot) {
+    point.parameter_covariance[slot] = static_cast<float>(observable(i, j));
+  });
+  const StateVector state = pack(fit.state);
+  std::transform(state.begin(), state.end(), point.state, [](double x) {
+    return static_cast<float>(x);
+  });
+  forUpperTriangle(fit.state_covariance.rows(), [&](auto i, auto j, int slot) {
+    point.state[PatchPoint::kStateCovariance + slot] =
+        static_cast<float>(fit.state_covariance(i, j));
+  });
+}
+
+int
+bitsOf(const FitFlags& flags)
+{
+  int bits = 0;
+  for (std::size_t i = 0; i < kFitFlagNames.size(); ++i)
+    bits |= static_cast<int>(flags.*kFitFlagNames[i].flag) << i;
+  return bits;
+}
+
+FitFlags
+flagsOf(int bits)
+{
+  FitFlags flags;
+  for (std::size_t i = 0; i < kFitFlagNames.size(); ++i)
+    flags.*kFitFlagNames[i].flag = ((bits >> i) & 1) != 0;
+  return flags;
+}
+
+// Clouds of former versions have no state: there it is that of the parameters, as if
+// bounded with the default containment, and has no covariance.
+void
+readState(const PatchPoint& point, FitResult& fit)
+{
+  fit.state = toState(fit.patch, FitOptions{}.containment);
+  const Eigen::Index n = stateLayoutOf(fit.patch.type).size();
+  if (point.state[PatchPoint::kStateCovariance] == 0.0F)
+    return;
+  StateVector state(n);
+  std::copy_n(point.state, n, state.begin());
+  fit.state =
+      unpackState(fit.patch.type, state, point.getNormalVector3fMap().cast<double>());
+  fit.state_covariance.resize(n, n);
+  forUpperTriangle(n, [&](auto i, auto j, int slot) {
+    fit.state_covariance(i, j) = fit.state_covariance(j, i) =
+        point.state[PatchPoint::kStateCovariance + slot];
   });
 }
 
@@ -49,6 +98,7 @@ writeNaN(PatchPoint& point)
   std::fill(std::begin(point.parameter_covariance),
             std::end(point.parameter_covariance),
             kNaN);
+  std::fill_n(point.state, PatchPoint::kChi2Expected, kNaN);
 }
 
 void
@@ -159,6 +209,9 @@ toPatchPoint(const ExtractedPatch& patch)
   writeValidation(patch, point);
   point.chi2 = static_cast<float>(fit.chi2);
   point.chi2_dof = fit.chi2_dof;
+  point.state[PatchPoint::kChi2Expected] = static_cast<float>(fit.chi2_expected);
+  point.state[PatchPoint::kNonlinearity] = static_cast<float>(fit.nonlinearity);
+  point.state[PatchPoint::kFlags] = static_cast<float>(bitsOf(fit.flags));
   point.points = fit.points;
   point.seed = patch.seed_index.value_or(-1);
   point.radius = static_cast<float>(patch.radius_m);
@@ -184,9 +237,16 @@ toExtractedPatch(const PatchPoint& point)
   readValidation(point, patch);
   if (isAccepted(patch))
     readNumbers(point, type, fit);
+  if (isAccepted(patch))
+    readState(point, fit);
   fit.chi2 = point.chi2;
   fit.chi2_dof = point.chi2_dof;
-  fit.chi2_expected = fit.chi2_dof;
+  // Not in clouds of former versions, which knew independent errors only.
+  fit.chi2_expected = point.state[PatchPoint::kChi2Expected] > 0.0F ?
+                          point.state[PatchPoint::kChi2Expected] :
+                          fit.chi2_dof;
+  fit.nonlinearity = point.state[PatchPoint::kNonlinearity];
+  fit.flags = flagsOf(static_cast<int>(point.state[PatchPoint::kFlags]));
   fit.points = point.points;
   if (point.seed >= 0)
     patch.seed_index = point.seed;

@@ -63,6 +63,44 @@ representationJacobian(const Patch& from, const Patch& to, const Pose& T)
   return A;
 }
 
+/// xx xy yy of a symmetric matrix in axes turned by W, from the old to the new.
+Eigen::Matrix3d
+entriesTurnedBy(const Eigen::Matrix3d& W)
+{
+  const double a = W(0, 0), b = W(0, 1), c = W(1, 0), d = W(1, 1);
+  Eigen::Matrix3d T;
+  T << a * a, 2.0 * a * b, b * b, a * c, a * d + b * c, b * d, c * c, 2.0 * c * d,
+      d * d;
+  return T;
+}
+
+/// The state's own frame follows its normal, and is turned about it by that.
+void
+moveState(const Pose& T, FitResult& moved)
+{
+  const PatchState before = moved.state;
+  PatchState& state = moved.state;
+  state.normal = T.R * before.normal;
+  state.centre = T.toWorld(before.centre);
+  const Eigen::Matrix3d W = state.frame().transpose() * T.R * before.frame();
+  const Eigen::Matrix3d turn = entriesTurnedBy(W);
+  state.moments = turn * before.moments;
+  state.curvature = turn * before.curvature;
+  if (moved.state_covariance.size() == 0)
+    return;
+  const StateLayout layout = stateLayoutOf(state.type);
+  StateMatrix J = StateMatrix::Identity(layout.size(), layout.size());
+  if (layout.m_count == 3)
+    J.topLeftCorner<3, 3>() = turn;
+  if (layout.k_count == 3)
+    J.block<3, 3>(layout.k(), layout.k()) = turn;
+  J.block<2, 2>(layout.nu(), layout.nu()) = W.topLeftCorner<2, 2>();
+  J.bottomRightCorner<3, 3>() = T.R;
+  moved.state_covariance = propagate(J, moved.state_covariance);
+  if (moved.state_mean_shift.size() > 0)
+    moved.state_mean_shift = J * moved.state_mean_shift;
+}
+
 } // namespace
 
 Pose
@@ -79,6 +117,7 @@ transformed(const FitResult& fit, const Pose& T)
   moved.patch = transformed(fit.patch, T);
   if (isRevolute(moved.patch.type))
     moved.patch.r.head<2>() = regularRxyFromNormal(moved.patch.normal());
+  moveState(T, moved);
   if (fit.covariance.size() == 0)
     return moved;
   const Eigen::FullPivLU<ParameterMatrix> chart(tangentJacobian(moved.patch));

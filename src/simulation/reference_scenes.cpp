@@ -2,6 +2,7 @@
 
 #include "sensor/require.h"
 
+#include <algorithm>
 #include <cmath>
 #include <initializer_list>
 #include <stdexcept>
@@ -86,6 +87,62 @@ sceneOf(const std::string& name,
   return result;
 }
 
+Eigen::Vector3d
+lineOfSight(double tilt, double azimuth)
+{
+  return {std::sin(tilt) * std::cos(azimuth),
+          std::sin(tilt) * std::sin(azimuth),
+          std::cos(tilt)};
+}
+
+/// The camera of the robot's scenes.
+Camera
+robotCamera()
+{
+  Camera kinect;
+  kinect.fx = kinect.fy = 580.0;
+  return kinect;
+}
+
+/// Draws in the order they are asked for.
+class Draw {
+public:
+  explicit Draw(std::mt19937_64& generator) : generator_(generator) {}
+
+  double uniform(double low, double high)
+  {
+    return low + (high - low) * std::generate_canonical<double, 53>(generator_);
+  }
+
+  /// In equal ratios.
+  double ratio(double low, double high)
+  {
+    return std::exp(uniform(std::log(low), std::log(high)));
+  }
+
+private:
+  std::mt19937_64& generator_;
+};
+
+/// The robot's patch, `radius` large and curved by `bend` over it, its two curvatures
+/// at any ratio.
+Patch
+scaledPatch(PatchType type, double radius, double bend, double share)
+{
+  constexpr double kRobotRadius = 0.1;
+  Patch patch = robotPatch(type);
+  const double scale = radius / kRobotRadius;
+  const int bounds =
+      type.boundary == BoundaryType::Quad ? 4 : boundaryParameterCount(type.boundary);
+  patch.d.head(bounds) *= scale;
+  const int curvatures = curvatureParameterCount(type.surface);
+  if (curvatures == 1)
+    patch.kappa[0] = -bend / radius;
+  else if (curvatures == 2)
+    patch.kappa << std::copysign(share * bend / radius, patch.kappa[0]), -bend / radius;
+  return patch;
+}
+
 } // namespace
 
 ReferenceScene
@@ -103,15 +160,35 @@ robotScene(PatchType type, double distance, double tilt, double azimuth)
   requirePositive("distance", distance);
   if (!(tilt >= 0.0 && tilt < kPi / 2.0))
     throw std::invalid_argument("tilt must lie in [0, pi/2)");
-  Camera kinect;
-  kinect.fx = kinect.fy = 580.0;
-  const Eigen::Vector3d line_of_sight(std::sin(tilt) * std::cos(azimuth),
-                                      std::sin(tilt) * std::sin(azimuth),
-                                      std::cos(tilt));
   return sceneOf("robot",
                  robotPatch(type),
-                 distance * line_of_sight,
-                 pixelRays(kinect, 6));
+                 distance * lineOfSight(tilt, azimuth),
+                 pixelRays(robotCamera(), 6));
+}
+
+ReferenceScene
+randomScene(PatchType type, std::mt19937_64& generator)
+{
+  Draw draw(generator);
+  const double distance = draw.uniform(0.6, 2.0), tilt = draw.uniform(0.0, 1.1);
+  const double azimuth = draw.uniform(0.0, 2.0 * kPi);
+  const double radius = draw.ratio(0.02, 0.25), points = draw.ratio(60.0, 5000.0);
+  const double bend = draw.ratio(0.05, 0.8), share = draw.uniform(0.05, 1.0);
+  const double aside = draw.uniform(0.0, 0.3) * distance;
+  const double direction = draw.uniform(0.0, 2.0 * kPi);
+  const Camera camera = robotCamera();
+  const double pixels = kPi * radius * radius * std::cos(tilt) * camera.fx * camera.fy /
+                        (distance * distance);
+  const int stride = std::max(1, static_cast<int>(std::sqrt(pixels / points)));
+  ReferenceScene result = sceneOf("random",
+                                  scaledPatch(type, radius, bend, share),
+                                  distance * lineOfSight(tilt, azimuth),
+                                  pixelRays(camera, stride));
+  const Pose& pose = result.scene.sensor_pose;
+  const Eigen::Vector3d target = aside * (std::cos(direction) * pose.R.col(0) +
+                                          std::sin(direction) * pose.R.col(1));
+  result.scene.sensor_pose = lookAt(pose.c, target, Eigen::Vector3d::UnitY());
+  return result;
 }
 
 } // namespace holdfast

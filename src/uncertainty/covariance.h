@@ -5,12 +5,20 @@
 
 #include <holdfast/uncertainty/covariance_mode.h>
 
+#include <limits>
+
 namespace holdfast {
 
-/// Covariance of a fitted patch's parameters [d | k | r | c].
+/// Covariance of a fitted patch's state [M | k | nu | c] and of its parameters
+/// [d | k | r | c].
 struct PatchCovariance {
-  ParameterMatrix covariance; ///< 0 x 0 when there is none
-  ParameterVector mean_shift; ///< SecondOrder only, else empty
+  StateMatrix state; ///< 0 x 0 when there is none
+  ParameterMatrix parameters; ///< 0 x 0 when there is none
+  StateVector state_shift; ///< SecondOrder only, else empty
+  ParameterVector shift; ///< SecondOrder only, else empty
+  /// trace(S1^-1 C2)/dof of the parameters, C2 the second-order terms and S1 what the
+  /// rest is; NaN where it was not computed (SecondOrder).
+  double nonlinearity = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// The estimate is a function of the points, so to first order
@@ -33,8 +41,18 @@ PatchCovariance patchCovariance(const PatchFit& fit,
 /// independent errors that is the number of its parameters, of shared ones more.
 double expectedChi2(const PatchFit& fit);
 
-/// What the covariance says of the fit: Converged, or which direction the data do not
-/// determine.
-FitStatus observability(const PatchFit& fit, const ParameterMatrix& covariance);
+/// Converged; Degenerate or NonFinite where the state's covariance is none.
+FitStatus statusOf(const PatchFit& fit, const PatchCovariance& uncertainty);
+
+/// How far from linear the parameters are in the points, and what of them is therefore
+/// not known (FitFlags).
+struct Linearity {
+  double nonlinearity = 0.0; ///< as FitResult::nonlinearity
+  FitFlags flags;
+};
+
+Linearity linearityOf(const PatchFit& fit,
+                      const PatchCovariance& uncertainty,
+                      CovarianceMode mode);
 
 } // namespace holdfast

@@ -127,24 +127,31 @@ drawPoints(const Model& model, std::mt19937_64& generator, PointBatch& batch)
     drawShared(model, generator, batch);
 }
 
+// Mean and unbiased covariance, where there are two samples or more.
+template <typename Vector, typename Matrix>
 void
-summarize(MonteCarloResult& result)
+summarize(const std::vector<Vector>& samples, Vector& mean, Matrix& covariance)
 {
-  const std::vector<ParameterVector>& samples = result.samples;
   if (samples.size() < 2)
     return;
   const Eigen::Index n = samples.front().size();
-  result.mean = ParameterVector::Zero(n);
-  for (const ParameterVector& sample : samples)
-    result.mean += sample;
-  result.mean /= static_cast<double>(samples.size());
-  result.covariance = ParameterMatrix::Zero(n, n);
-  for (const ParameterVector& sample : samples) {
-    const ParameterVector deviation = sample - result.mean;
-    result.covariance += deviation * deviation.transpose();
+  mean = Vector::Zero(n);
+  for (const Vector& sample : samples)
+    mean += sample;
+  mean /= static_cast<double>(samples.size());
+  covariance = Matrix::Zero(n, n);
+  for (const Vector& sample : samples) {
+    const Vector deviation = sample - mean;
+    covariance += deviation * deviation.transpose();
   }
-  result.covariance /= static_cast<double>(samples.size() - 1);
+  covariance /= static_cast<double>(samples.size() - 1);
 }
+
+// One trial that converged.
+struct Trial {
+  ParameterVector parameters;
+  StateVector state;
+};
 
 } // namespace
 
@@ -165,7 +172,8 @@ monteCarloCovariance(const Patch& reference,
     throw std::invalid_argument("a Monte Carlo run needs one trial or more");
   const PatchFitter fitter(withType(options, reference.type));
   const Model model = modelOf(batch);
-  std::vector<std::optional<ParameterVector>> trials(
+  const PatchState about = toState(reference, options.containment);
+  std::vector<std::optional<Trial>> trials(
       static_cast<std::size_t>(monte_carlo.trials));
   const auto work = [&](int trial, int) {
     thread_local PointBatch drawn;
@@ -175,18 +183,22 @@ monteCarloCovariance(const Patch& reference,
     const PatchFit fit = fitter.fit(drawn);
     if (fit.status == FitStatus::Converged)
       trials[static_cast<std::size_t>(trial)] =
-          pack(nearestRepresentation(fit.bounded.patch, reference));
+          Trial{pack(nearestRepresentation(fit.bounded.patch, reference)),
+                difference(fit.bounded.state, about)};
   };
   parallelFor(monte_carlo.trials, monte_carlo.threads, work, monte_carlo.progress);
 
   MonteCarloResult result;
   for (const auto& trial : trials) {
-    if (trial)
-      result.samples.push_back(*trial);
-    else
+    if (!trial) {
       ++result.failures;
+      continue;
+    }
+    result.samples.push_back(trial->parameters);
+    result.states.push_back(trial->state);
   }
-  summarize(result);
+  summarize(result.samples, result.mean, result.covariance);
+  summarize(result.states, result.state_mean, result.state_covariance);
   return result;
 }
 

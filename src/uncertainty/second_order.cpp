@@ -11,8 +11,15 @@ namespace {
 
 using Joint = Eigen::Matrix<double, JointLayout::kSize, 1>;
 using JointMatrix = Eigen::Matrix<double, JointLayout::kSize, JointLayout::kSize>;
-// Second derivatives of one parameter in whitened coordinates.
-using Curvature = JointMatrix;
+// Parameters, then the coordinates of the state.
+using Output =
+    Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxParameters + kMaxState, 1>;
+using OutputMatrix = Eigen::Matrix<double,
+                                   Eigen::Dynamic,
+                                   Eigen::Dynamic,
+                                   0,
+                                   kMaxParameters + kMaxState,
+                                   kMaxParameters + kMaxState>;
 
 // The scatter moved by (mean, scatter) entries given in the axes of R.
 Scatter
@@ -34,7 +41,7 @@ public:
   : fit_(fit), fitter_(fitter), origin_(origin), reference_(fit.bounded.patch)
   {}
 
-  ParameterVector operator()(const Joint& x) const
+  Output operator()(const Joint& x) const
   {
     const UnboundedSurface& surface = fit_.surface.surface;
     const Scatter scatter = movedScatter(fit_.scatter, surface.R, x);
@@ -51,7 +58,12 @@ public:
                                                 scatter,
                                                 fit_.has_plane_stage ? &plane : nullptr,
                                                 origin_});
-    return pack(nearestRepresentation(bounded.patch, reference_));
+    const ParameterVector parameters =
+        pack(nearestRepresentation(bounded.patch, reference_));
+    const StateVector state = difference(bounded.state, fit_.bounded.state);
+    Output output(parameters.size() + state.size());
+    output << parameters, state;
+    return output;
   }
 
 private:
@@ -84,29 +96,31 @@ secondOrderTerms(const PatchFit& fit,
       steps.push_back(scale.cwiseProduct(std::sqrt(solver.eigenvalues()[i]) *
                                          solver.eigenvectors().col(i)));
 
-  const ParameterVector at = F(Joint::Zero());
+  const Output at = F(Joint::Zero());
   const int n = static_cast<int>(at.size()), m = static_cast<int>(steps.size());
-  std::vector<ParameterVector> plus(steps.size()), minus(steps.size());
+  std::vector<Output> plus(steps.size()), minus(steps.size());
   for (int i = 0; i < m; ++i) {
     plus[i] = F(steps[i]);
     minus[i] = F(-steps[i]);
   }
-  SecondOrderTerms terms;
-  terms.shift = ParameterVector::Zero(n);
-  terms.covariance = ParameterMatrix::Zero(n, n);
+  Output shift = Output::Zero(n);
+  OutputMatrix covariance = OutputMatrix::Zero(n, n);
   for (int i = 0; i < m; ++i) {
-    const ParameterVector diagonal = plus[i] - 2.0 * at + minus[i];
-    terms.shift += 0.5 * diagonal;
-    terms.covariance += 0.5 * diagonal * diagonal.transpose();
+    const Output diagonal = plus[i] - 2.0 * at + minus[i];
+    shift += 0.5 * diagonal;
+    covariance += 0.5 * diagonal * diagonal.transpose();
     for (int j = 0; j < i; ++j) {
       // Cross difference of step one, symmetric: error of third order.
-      const ParameterVector mixed =
-          0.5 * (F(steps[i] + steps[j]) + F(-steps[i] - steps[j]) - plus[i] - minus[i] -
-                 plus[j] - minus[j] + 2.0 * at);
-      terms.covariance += mixed * mixed.transpose();
+      const Output mixed = 0.5 * (F(steps[i] + steps[j]) + F(-steps[i] - steps[j]) -
+                                  plus[i] - minus[i] - plus[j] - minus[j] + 2.0 * at);
+      covariance += mixed * mixed.transpose();
     }
   }
-  return terms;
+  const int states = stateLayoutOf(fit.bounded.state.type).size();
+  return {covariance.topLeftCorner(n - states, n - states),
+          shift.head(n - states),
+          covariance.bottomRightCorner(states, states),
+          shift.tail(states)};
 }
 
 } // namespace holdfast

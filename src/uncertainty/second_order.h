@@ -13,10 +13,13 @@ struct SecondOrderTerms {
   /// points. Reported, not applied: estimate - shift is unbiased, but a confidence
   /// region belongs at estimate + shift.
   ParameterVector shift;
+  StateMatrix state_covariance; ///< the same, of the state
+  StateVector state_shift;
 };
 
 /// Pushes the joint Gaussian of surface and moments (theta, s) through the second
-/// derivatives of the map F from there to [d | k | r | c], found by differencing
+/// derivatives of the map F from there to [d | k | r | c] and to the state, found by
+/// differencing
 /// PatchFitter::bound() over one sigma along the principal directions of that Gaussian:
 /// over the range in which the estimate really moves.
 /// \param joint covariance of (theta, mean, scatter[, plane stage]) in the axes of the

@@ -10,6 +10,15 @@
 
 namespace holdfast {
 
+/// Trials by the nonlinearity that their fits report.
+struct ConsistencyColumn {
+  double up_to = 0.0; ///< FitResult::nonlinearity
+  int trials = 0;
+  double state_nees_per_dof = 0.0;
+  double state_coverage95 = 0.0;
+  double nees_per_dof = 0.0; ///< of the parameters, axes that switched left out
+};
+
 struct ConsistencyOptions {
   FitOptions fit; ///< surface and boundary are set to the type of the scene's patch
   CovarianceMode mode = CovarianceMode::Exact;
@@ -42,12 +51,24 @@ struct ConsistencyResult {
   std::vector<double> bias_sigma;
   /// As bias_sigma after subtracting the second-order shift at the noise-free fit.
   std::vector<double> bias_after_shift_sigma;
+  /// Of the state (holdfast/patch/state.h), over all usable trials, as nees_per_dof and
+  /// coverage95, which are those of the parameters.
+  double state_nees_per_dof = 0.0;
+  double state_coverage95 = 0.0;
+  /// Of those without a flag, and their share in the usable trials.
+  double unflagged_nees_per_dof = 0.0;
+  double unflagged_rate = 0.0;
+  std::vector<ConsistencyColumn> by_nonlinearity;
   double type_error_rate = 0.0;
   /// Trials whose axes came out turned by more than 45 degrees; left out above.
   double switch_rate = 0.0;
   /// Trials without a usable fit; left out above.
   double failure_rate = 0.0;
 };
+
+/// All trials of several checks of one type together: means weighted with their trials;
+/// biases and ratios of sigmas, which belong to one scene, are left out.
+ConsistencyResult pooled(const std::vector<ConsistencyResult>& results);
 
 /// \param scene its first patch is fitted; points on anything else are not used.
 /// \param noise the model that noise is drawn from and covariances are taken from.

@@ -38,4 +38,14 @@ inline constexpr EnumNames<FitStatus, 10> kStatusNames{{"converged",
                                                         "orientation_singular",
                                                         "non_finite"}};
 
+struct FitFlagName {
+  std::string_view name;
+  bool FitFlags::*flag;
+};
+
+inline constexpr std::array<FitFlagName, 3> kFitFlagNames{
+    {{"axis_not_observable", &FitFlags::axis_not_observable},
+     {"curvature_not_observable", &FitFlags::curvature_not_observable},
+     {"orientation_singular", &FitFlags::orientation_singular}}};
+
 } // namespace holdfast

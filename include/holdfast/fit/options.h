@@ -109,6 +109,10 @@ struct FitOptions {
   /// Normal of sphere and cylinder from the PCA, not from a weighted plane that does
   /// not fit them.
   bool normal_from_pca = true;
+  /// Centre of a sphere's patch where the line of the normal through the centroid meets
+  /// it, not at its apex along the normal from the fitted centre, which slides where
+  /// the curvature is uncertain.
+  bool centre_on_normal_line = true;
   /// Radius of circular bounds from the mean of the two moments, not from the larger
   /// one, which has a kink where they are equal.
   bool smooth_circle_radius = true;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <holdfast/patch/parameters.h>
+#include <holdfast/patch/state.h>
 
 #include <cstdint>
 #include <string_view>
@@ -11,19 +12,14 @@ namespace holdfast {
 /// The comment is the test itself.
 enum class FitStatus : std::uint8_t {
   Converged, ///< last Newton step below the tolerance; patch valid
-  AxisNotObservable, ///< as Converged, but kappa_x and kappa_y (or the two moments
-                     ///< of a plane) are too close to tell the x axis: its
-                     ///< variance is huge or capped
-  CurvatureNotObservable, ///< as Converged, but |kappa| of a sphere or cylinder is
-                          ///< below three of its sigmas, or its radius more than 50
-                          ///< times the spread (root mean square; of a cylinder:
-                          ///< across its axis) of the points: the centre slides
+  AxisNotObservable, ///< no longer produced: FitFlags
+  CurvatureNotObservable, ///< no longer produced: FitFlags
   IterationLimit, ///< max_iterations reached; patch is the best so far
   TooFewPoints, ///< fewer valid points than surface parameters
   Degenerate, ///< normal equations singular (see null_space); no extent; |kappa| of a
-              ///< sphere or cylinder below a tenth of its sigma; a normal uncertain by
-              ///< more than 1 rad; or a covariance whose terms cancelled down to
-              ///< rounding: correlations with an eigenvalue below -1e-6
+              ///< cylinder below a tenth of its sigma; a normal uncertain by more than
+              ///< 1 rad; or a covariance whose terms cancelled down to rounding:
+              ///< correlations with an eigenvalue below -1e-6
   CurvatureOutOfRange, ///< |kappa| > max_curvature_per_m
   CurvatureSignMismatch, ///< elliptic forced on opposite signs or hyperbolic on equal
   OrientationSingular, ///< |r_xy| = pi: no longer produced (r_xy keeps off the chart's
@@ -38,6 +34,30 @@ std::string_view statusName(FitStatus status);
 /// and positive semi-definite (no eigenvalue of its correlations below -1e-6).
 bool isUsable(FitStatus status);
 
+/// What the data do not tell of a patch that is otherwise all right. The state and its
+/// covariance hold all the same; of the parameters' covariance, which is first order in
+/// any case, the entries concerned mean nothing: observableCovariance() and files leave
+/// them out.
+struct FitFlags {
+  /// The angle of the x axis is uncertain by more than 0.03 rad (second order: 0.10),
+  /// since the curvatures, or the moments of a plane, are too close to each other: d, k
+  /// and r are no linear functions of the points.
+  bool axis_not_observable = false;
+  /// |kappa| of a cylinder is below 20 of its sigmas (second order: 12) and d, k and r
+  /// are no linear functions of the points, or that of a sphere below three; or the
+  /// radius is more than 50 times the spread (root mean square; of a cylinder: across
+  /// its axis) of the points.
+  bool curvature_not_observable = false;
+  /// r_xy of a round type is within ten sigmas of the normal from |r_xy| = pi, where a
+  /// camera looks straight at the surface: r is no linear function of the points.
+  bool orientation_singular = false;
+
+  bool any() const
+  {
+    return axis_not_observable || curvature_not_observable || orientation_singular;
+  }
+};
+
 /// Undetermined directions in the solver's parameters (fit/kernel.h), one unit
 /// column each; rows are padded to six.
 using NullSpace = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::DontAlign, 6, 6>;
@@ -46,12 +66,23 @@ struct FitResult {
   FitStatus status = FitStatus::TooFewPoints;
   /// Meaningful when isUsable(status), and the best so far at IterationLimit.
   Patch patch;
+  /// The patch in regular coordinates (holdfast/patch/state.h), and their covariance;
+  /// 0 x 0 when not usable.
+  PatchState state;
+  StateMatrix state_covariance;
   /// Covariance of [d | k | r | c] (holdfast/patch/parameters.h); 0 x 0 when not
-  /// usable.
+  /// usable. Where flags are set see observableCovariance().
   ParameterMatrix covariance;
+  FitFlags flags;
+  /// How far from linear the parameters are in the points: the share of second order in
+  /// their covariance, trace(S1^-1 C2)/dof; computed in second order, else estimated
+  /// from the sigma of the axis and the curvature in sigmas. Below 0.03 their
+  /// covariance is right within a percent or two.
+  double nonlinearity = 0.0;
   /// By how much the mean of the estimate is off, to second order; empty unless the
   /// covariance was computed to second order. Not applied to the patch.
   ParameterVector mean_shift;
+  StateVector state_mean_shift; ///< the same, of the state
   /// Sum of squared residuals over the point covariances, and its degrees of freedom
   /// (points minus surface parameters).
   double chi2 = 0.0;
@@ -72,6 +103,10 @@ struct FitResult {
   /// the surface is determined, but not its bounds or its normal.
   NullSpace null_space = NullSpace(6, 0);
 };
+
+/// The covariance of the parameters without the entries that the flags say nothing of:
+/// they are NaN. 0 x 0 when not usable.
+ParameterMatrix observableCovariance(const FitResult& fit);
 
 /// How far the normal may be off: the rms angle between the fitted normal and that of
 /// the points without noise, rad, from the covariance. NaN when not usable.

@@ -59,9 +59,9 @@ struct EIGEN_ALIGN16 PointXYZCovariance {
 
 /// A fitted patch as a point at its centre with its normal (towards the sensor).
 ///
-/// Where no patch was found, or validation turned it down, position, normal, parameters
-/// and covariance are NaN, and `status` and `verdict` say why. `residual` and
-/// `coverage` are NaN where they were not measured. toPatchPoint() and
+/// Where no patch was found, or validation turned it down, position, normal,
+/// parameters, state and covariances are NaN, and `status` and `verdict` say why.
+/// `residual` and `coverage` are NaN where they were not measured. toPatchPoint() and
 /// toExtractedPatch() in conversions.h translate.
 struct EIGEN_ALIGN16 PatchPoint {
   PCL_ADD_POINT4D
@@ -72,6 +72,16 @@ struct EIGEN_ALIGN16 PatchPoint {
   /// Upper triangle of their covariance, row by row; zero after the last entry. Named
   /// so that no reader takes it for the covariance of a point.
   float parameter_covariance[66] = {};
+  /// One field for all that belongs to the state, since PCL's point types end at twenty
+  /// fields: [M | k | nu | c] in m^2, 1/m and m (holdfast/patch/state.h; nu is zero),
+  /// the upper triangle of its covariance as parameter_covariance, the mean of chi2
+  /// where surface and noise are right, FitResult::nonlinearity, and FitFlags as 1, 2
+  /// and 4.
+  float state[80] = {};
+  static constexpr int kStateCovariance = 11;
+  static constexpr int kChi2Expected = 77;
+  static constexpr int kNonlinearity = 78;
+  static constexpr int kFlags = 79;
   float residual = 0.0F; ///< rms distance of the points from the surface, m
   float coverage = 0.0F; ///< share of the patch that points support
   float chi2 = 0.0F; ///< sum of squared residuals over the point covariances
@@ -111,6 +121,7 @@ POINT_CLOUD_REGISTER_POINT_STRUCT(holdfast::PatchPoint,
   (float, normal_z, normal_z)
   (float[11], parameters, parameters)
   (float[66], parameter_covariance, parameter_covariance)
+  (float[80], state, state)
   (float, residual, residual)
   (float, coverage, coverage)
   (float, chi2, chi2)

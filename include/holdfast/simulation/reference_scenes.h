@@ -4,6 +4,8 @@
 #include <holdfast/simulation/scene.h>
 #include <holdfast/simulation/simulator.h>
 
+#include <random>
+
 namespace holdfast {
 
 /// One patch, in scene.patches[0], at the origin with its axes along the world's, the
@@ -26,5 +28,12 @@ ReferenceScene tableTwoScene(PatchType type);
 /// \throw std::invalid_argument when the type is not legal, the distance not positive
 /// or the tilt not in [0, pi/2).
 ReferenceScene robotScene(PatchType type, double distance, double tilt, double azimuth);
+
+/// A view nobody chose: a patch of the robot's kind, 2 to 25 cm large, curved by 0.05
+/// to 0.8 over its radius, from 0.6 to 2 m at any tilt up to 1.1 rad, anywhere in the
+/// image of that Kinect, at the stride (1 pixel or more) that leaves 60 to 5000 points;
+/// sizes, curvatures and numbers of points in equal ratios. \throw
+/// std::invalid_argument when the type is not legal.
+ReferenceScene randomScene(PatchType type, std::mt19937_64& generator);
 
 } // namespace holdfast

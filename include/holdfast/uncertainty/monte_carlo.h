@@ -3,7 +3,7 @@
 
 #include <holdfast/fit/options.h>
 #include <holdfast/fit/point_batch.h>
-#include <holdfast/patch/parameters.h>
+#include <holdfast/patch/state.h>
 #include <holdfast/progress.h>
 
 #include <cstdint>
@@ -27,6 +27,11 @@ struct MonteCarloResult {
   /// Over the samples; empty with fewer than two.
   ParameterVector mean;
   ParameterMatrix covariance; ///< unbiased, over n - 1
+  /// The same of their states, each as its difference from the reference's
+  /// (holdfast/patch/state.h).
+  std::vector<StateVector> states;
+  StateVector state_mean;
+  StateMatrix state_covariance;
 };
 
 /// Spread of the estimate when the noise is drawn again: every trial adds noise

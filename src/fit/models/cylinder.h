@@ -72,6 +72,13 @@ struct Cylinder : ModelBase<kernel::Model::Cylinder> {
     return std::abs(k[0]);
   }
 
+  static Eigen::Matrix3d curvatureMatrix()
+  {
+    Eigen::Matrix3d shares = Eigen::Matrix3d::Zero();
+    shares(2, 0) = 1.0;
+    return shares;
+  }
+
   static Eigen::Vector3d curvatureShares()
   {
     return Eigen::Vector3d::UnitX();

@@ -13,6 +13,7 @@
 //   retracted           the surface moved by a step of theta
 //   start               a start about one sigma from the solution
 //   largestCurvature    by magnitude, 1/m
+//   curvatureMatrix     kxx kxy kyy in the axes of the placement, from k
 //   curvatureShares     the weights of k in the one curvature of a round patch
 //   place               the frame of a patch; none where the surface has no normal
 #pragma once

@@ -73,6 +73,11 @@ struct Paraboloid : ModelBase<kernel::Model::Paraboloid> {
     return std::abs(mean) + std::hypot(0.5 * (k[0] - k[2]), k[1]);
   }
 
+  static Eigen::Matrix3d curvatureMatrix()
+  {
+    return Eigen::Matrix3d::Identity();
+  }
+
   static Eigen::Vector3d curvatureShares()
   {
     return {0.5, 0.0, 0.5};
@@ -83,7 +88,7 @@ struct Paraboloid : ModelBase<kernel::Model::Paraboloid> {
   {
     const UnboundedSurface& surface = request.surface;
     // The line of its centre is the scatter's normal, whatever else there is.
-    const NormalMap normal = normalMap({surface, request.scatter, nullptr});
+    const NormalMap normal = normalMap({surface, request.scatter, nullptr, false});
     Placement p{surface.R, surface.c, surface.R.col(2)};
     p.delta(0, 3) = p.delta(1, 4) = 1.0;
     p.gamma.middleCols<3>(JointLayout::kMean).setIdentity();

@@ -45,6 +45,11 @@ struct Plane : ModelBase<kernel::Model::Plane> {
     return 0.0;
   }
 
+  static Eigen::Matrix3d curvatureMatrix()
+  {
+    return Eigen::Matrix3d::Zero();
+  }
+
   static Eigen::Vector3d curvatureShares()
   {
     return Eigen::Vector3d::Zero();

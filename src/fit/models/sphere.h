@@ -51,14 +51,70 @@ struct Sphere : ModelBase<kernel::Model::Sphere> {
     return std::abs(k[0]);
   }
 
+  static Eigen::Matrix3d curvatureMatrix()
+  {
+    Eigen::Matrix3d shares = Eigen::Matrix3d::Zero();
+    shares(0, 0) = shares(2, 0) = 1.0;
+    return shares;
+  }
+
   static Eigen::Vector3d curvatureShares()
   {
     return Eigen::Vector3d::UnitX();
   }
 
+  static std::optional<Placement> place(const PlacementRequest& request)
+  {
+    if (request.centre_on_normal_line)
+      if (const auto placed = placeOnNormalLine(request))
+        return placed;
+    return placeApex(request);
+  }
+
+private:
+  // The point of the sphere on the line of the normal through the centroid, and the
+  // sphere's own normal there. It is where the points are, however little they know of
+  // the centre: an apex along the normal from there slides with 1/k. None where the
+  // line misses the sphere.
+  static std::optional<Placement> placeOnNormalLine(const PlacementRequest& request)
+  {
+    const UnboundedSurface& surface = request.surface;
+    const NormalMap normal = normalMap(request);
+    const double k = safeGap(surface.k[0], 1.0);
+    const Eigen::Vector3d& n = normal.n;
+    const Eigen::Vector3d mean =
+        surface.R.transpose() * (request.scatter.mean - surface.c);
+    // e: from the centre of the sphere to the mean; the line meets the sphere at
+    // mean + s n, |e + s n| = 1/|k|, where its normal k (centre - c) is along n.
+    const Eigen::Vector3d e = mean - Eigen::Vector3d::UnitZ() / k;
+    const double along = e.dot(n);
+    const double D = 1.0 / (k * k) - e.squaredNorm() + along * along;
+    if (!(D > 0.0))
+      return std::nullopt;
+    const double root = std::copysign(std::sqrt(D), k);
+    const double s = -along - root;
+    JointRows3 dmean = JointRows3::Zero(), de;
+    dmean.middleCols<3>(JointLayout::kMean).setIdentity();
+    de = dmean;
+    de.middleCols<3>(1) -= Eigen::Matrix3d::Identity();
+    de(2, 0) += 1.0 / (k * k);
+    const JointRow dalong = n.transpose() * de + e.transpose() * normal.dn;
+    JointRow dD = 2.0 * along * dalong - 2.0 * e.transpose() * de;
+    dD[0] -= 2.0 / (k * k * k);
+    const JointRow ds = -dalong - dD / (2.0 * root);
+    const Eigen::Vector3d c = mean + s * n, z = -k * (e + s * n);
+    Placement p{surface.R, surface.c + surface.R * c, surface.R * z};
+    p.gamma = dmean + n * ds + s * normal.dn;
+    JointRows3 dz = -k * (de + n * ds + s * normal.dn);
+    dz.col(0) += z / k;
+    // In the surface's axes: the rotation that moves z, about axes normal to it.
+    p.delta = skew(z) * dz;
+    return p;
+  }
+
   // I-2 (ii), s = sphere: apex c = centre - n/k, centre = c_fit + z/k
   // (paper eq. (4) with the missing terms dc = dC + n dk/k^2 - dn/k).
-  static std::optional<Placement> place(const PlacementRequest& request)
+  static std::optional<Placement> placeApex(const PlacementRequest& request)
   {
     const UnboundedSurface& surface = request.surface;
     const NormalMap normal = normalMap(request);
