@@ -40,14 +40,14 @@ imageOf(const Camera& camera, const std::function<double(int u, int v)>& dispari
 
 /// Frames of a plane, tilted at random, between 0.6 and 2.2 m, with a pattern that
 /// stays and white noise that does not.
-Pose
+PoseFrames
 randomPose(int frames, const std::vector<double>& pattern, test::Random& random)
 {
   const Camera camera;
   const double level = random.uniform(35.0, 55.0);
   const double along_u = random.uniform(-0.02, 0.02);
   const double along_v = random.uniform(-0.04, 0.04);
-  Pose pose;
+  PoseFrames pose;
   for (int t = 0; t < frames; ++t)
     pose.push_back(imageOf(camera, [&](int u, int v) {
       const auto i = static_cast<std::size_t>(v * camera.width + u);
@@ -142,7 +142,7 @@ TEST(PatternCalibration, OtherPosesTellTheCameraFromTheSurface)
   for (std::uint64_t i = 0; i < 10; ++i) {
     test::Random random(i);
     const std::vector<double> camera = field.draw(random);
-    std::vector<Pose> poses;
+    std::vector<PoseFrames> poses;
     for (int p = 0; p < 2; ++p) {
       std::vector<double> sum = field.draw(random);
       for (std::size_t k = 0; k < sum.size(); ++k)
@@ -160,11 +160,11 @@ TEST(PatternCalibration, OtherPosesTellTheCameraFromTheSurface)
 TEST(PatternCalibration, NamesThePoseWithoutPlanes)
 {
   test::Random random;
-  const Pose good = randomPose(1, {}, random);
-  const Pose bumpy{imageOf(Camera{}, [&](int u, int v) {
+  const PoseFrames good = randomPose(1, {}, random);
+  const PoseFrames bumpy{imageOf(Camera{}, [&](int u, int v) {
     return 40.0 + 2.0 * std::sin(u / 6.4) * std::sin(v / 6.4) + 0.05 * random.normal();
   })};
-  const Pose empty{imageOf(Camera{}, [](int, int) { return std::nan(""); })};
+  const PoseFrames empty{imageOf(Camera{}, [](int, int) { return std::nan(""); })};
   PatternCalibration found = calibratePattern({good, bumpy}, optionsFor(Camera{}));
   EXPECT_EQ(found.status, NoiseCalibrationStatus::NothingFlat);
   EXPECT_EQ(found.pose, 1);
@@ -177,11 +177,11 @@ TEST(PatternCalibration, NamesThePoseWithoutPlanes)
 TEST(PatternCalibration, RejectsMisuse)
 {
   test::Random random;
-  const Pose good = randomPose(1, {}, random);
+  const PoseFrames good = randomPose(1, {}, random);
   NoiseCalibrationOptions options = optionsFor(Camera{});
   EXPECT_THROW(calibratePattern({}, options), std::invalid_argument);
   EXPECT_THROW(calibratePattern({good, {}}, options), std::invalid_argument);
-  Pose turned = good;
+  PoseFrames turned = good;
   turned[0].width = 480;
   turned[0].height = 640;
   EXPECT_THROW(calibratePattern({good, turned}, options), std::invalid_argument);

@@ -140,10 +140,10 @@ struct Observed {
 };
 
 Observed
-observe(const std::vector<Pose>& poses, const NoiseCalibrationOptions& options)
+observe(const std::vector<PoseFrames>& poses, const NoiseCalibrationOptions& options)
 {
   Observed observed;
-  for (const Pose& pose : poses) {
+  for (const PoseFrames& pose : poses) {
     const DisparityStack stack(pose, options);
     const TileImage tiles = stack.tiles(pose, options);
     const FlatRegions flat = findFlatRegions(tiles, options);
@@ -362,11 +362,11 @@ distantRowsOf(const std::vector<CellSums>& cells, const BlockCorrelogram& blocks
 }
 
 void
-requireSameSizes(const std::vector<Pose>& poses)
+requireSameSizes(const std::vector<PoseFrames>& poses)
 {
   if (poses.empty())
     throw std::invalid_argument("there is no pose");
-  for (const Pose& pose : poses) {
+  for (const PoseFrames& pose : poses) {
     if (pose.empty())
       throw std::invalid_argument("a pose has no frame");
     requireSameSizes(pose);
@@ -388,7 +388,8 @@ PatternCalibration::pattern() const
 }
 
 PatternCalibration
-calibratePattern(const std::vector<Pose>& poses, const NoiseCalibrationOptions& options)
+calibratePattern(const std::vector<PoseFrames>& poses,
+                 const NoiseCalibrationOptions& options)
 {
   if (const std::string error = validityError(options); !error.empty())
     throw std::invalid_argument(error);

@@ -20,7 +20,7 @@
 namespace holdfast {
 
 /// Frames of one resting scene from one place.
-using Pose = std::vector<PointImage>;
+using PoseFrames = std::vector<PointImage>;
 
 /// One wave of the pattern. Sigma in px of disparity, length in px of the image.
 struct WaveEstimate {
@@ -79,7 +79,7 @@ struct PatternCalibration {
 /// count: small flat spots are too small for long waves.
 /// \throw std::invalid_argument as calibrateNoise(), for sizes that differ between
 /// poses, too.
-PatternCalibration calibratePattern(const std::vector<Pose>& poses,
+PatternCalibration calibratePattern(const std::vector<PoseFrames>& poses,
                                     const NoiseCalibrationOptions& options);
 
 } // namespace holdfast

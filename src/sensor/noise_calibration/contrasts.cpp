@@ -30,8 +30,9 @@ makeSteps()
 double
 contrast(const std::vector<float>& image, std::size_t middle, std::size_t offset)
 {
-  return static_cast<double>(image[middle - offset]) - 2.0 * image[middle] +
-         image[middle + offset];
+  const double before = image[middle - offset], here = image[middle];
+  const double after = image[middle + offset];
+  return before - 2.0 * here + after;
 }
 
 bool
@@ -114,7 +115,7 @@ meanOf(const std::vector<std::vector<float>>& frames, std::size_t i)
   int count = 0;
   for (const std::vector<float>& frame : frames)
     if (std::isfinite(frame[i])) {
-      sum += frame[i];
+      sum += static_cast<double>(frame[i]);
       ++count;
     }
   return count > 0 ? static_cast<float>(sum / count) : kNaN;
