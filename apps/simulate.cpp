@@ -2,6 +2,7 @@
 #include <holdfast/io/cloud_io.h>
 #include <holdfast/io/config.h>
 #include <holdfast/patch/parameters.h>
+#include <holdfast/sensor/names.h>
 #include <holdfast/simulation/simulator.h>
 #include <holdfast/version.h>
 
@@ -37,6 +38,7 @@ struct SimulateArguments {
   int stride = 1;
   std::uint64_t random_seed = 1;
   SimulationOptions simulation;
+  bool no_pattern = false;
   bool covariance = false;
   bool quiet = false; ///< it has nothing to say but errors anyway
   bool ascii = false;
@@ -106,12 +108,26 @@ shapeJson(const Shape& shape)
   return object;
 }
 
+/// The pattern that was drawn, as among the results of a fit: sigmas in the unit of the
+/// model, lengths in pixels of the image.
 Json
-sensorJson(const Sensor& sensor, const Camera& camera, const Pose& pose)
+patternJson(const NoisePattern& pattern, int stride)
+{
+  Json waves = Json::array();
+  for (const PatternWave& wave : pattern.waves)
+    waves.push_back({{"sigma", wave.sigma},
+                     {"length_px", wave.length_px / stride},
+                     {"shape", kPatternShapeNames.of(wave.shape)}});
+  return waves;
+}
+
+Json
+sensorJson(const Sensor& sensor, const Camera& camera, int stride, const Pose& pose)
 {
   const Eigen::Quaterniond q(pose.R);
   return {{"name", sensor.name},
           {"noise", sensor.noise->name()},
+          {"pattern", patternJson(sensor.pattern, stride)},
           {"camera",
            {{"width", camera.width},
             {"height", camera.height},
@@ -143,7 +159,7 @@ truthJson(const SimulateArguments& arguments,
           {"noise_scale", arguments.simulation.noise_scale},
           {"quantized", arguments.simulation.quantize},
           {"stride", arguments.stride},
-          {"sensor", sensorJson(sensor, camera, scene.sensor_pose)},
+          {"sensor", sensorJson(sensor, camera, arguments.stride, scene.sensor_pose)},
           {"patches", patches},
           {"shapes", shapes}};
 }
@@ -170,7 +186,8 @@ save(const std::string& output, const RangeCloud& cloud, bool ascii, const Json&
 void
 runSimulate(const SimulateArguments& arguments)
 {
-  const Sensor sensor = loadSensor(arguments.sensor);
+  const Sensor named = loadSensor(arguments.sensor);
+  const Sensor sensor = arguments.no_pattern ? withoutPattern(named) : named;
   if (arguments.simulation.quantize && sensor.disparity_quantum_px == 0.0)
     throw CLI::ValidationError("--quantize",
                                "sensor " + sensor.name + " has no disparity quantum");
@@ -279,12 +296,20 @@ addNoiseOptions(CLI::App& command, SimulateArguments& arguments)
       ->check(requireFactor)
       ->capture_default_str()
       ->type_name("X");
+  command.add_flag("--no-pattern",
+                   arguments.no_pattern,
+                   "draw the errors of neighbouring pixels independently, also where "
+                   "the sensor file says what they share (its pattern); a fit of such "
+                   "a cloud wants --no-pattern, too");
   command.add_flag("--quantize",
                    arguments.simulation.quantize,
                    "round the disparity to the sensor's steps, after the noise");
-  command.add_flag("--covariance",
-                   arguments.covariance,
-                   "write the covariance of each point's noise too (m^2)");
+  command.add_flag(
+      "--covariance",
+      arguments.covariance,
+      "write the covariance of each point's noise too (m^2); what neighbouring "
+      "pixels share of it is not in the cloud then, and a fit of it "
+      "takes them as independent");
   command.add_flag("--ascii", arguments.ascii, "text instead of binary PCD");
   addQuietOption(command, arguments.quiet);
 }
@@ -303,7 +328,8 @@ addSimulateCommand(CLI::App& app, int& exit_code)
                   "  holdfast simulate rocks -o rocks.pcd --quantize\n"
                   "  holdfast simulate sphere -o sphere.pcd --distance 0.8 "
                   "--sensor realsense_d435\n"
-                  "  holdfast simulate mix -o mix.pcd --noise-scale 0 --stride 4");
+                  "  holdfast simulate mix -o mix.pcd --noise-scale 0 --stride 4\n"
+                  "  holdfast simulate table -o table.pcd --no-pattern");
   command->callback([arguments, &exit_code] {
     runSimulate(*arguments);
     exit_code = 0;

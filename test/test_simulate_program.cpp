@@ -1,4 +1,5 @@
 #include <holdfast/io/cloud_io.h>
+#include <holdfast/io/config.h>
 #include <holdfast/patch/parameters.h>
 #include <holdfast/patch/surface.h>
 #include <holdfast/simulation/scene.h>
@@ -9,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include <cmath>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -123,6 +125,34 @@ TEST_F(SimulateProgram, TruthDescribesSensorAndScene)
   const auto position = json.at("sensor").at("position").get<std::vector<double>>();
   for (int i = 0; i < 3; ++i)
     EXPECT_EQ(position[static_cast<std::size_t>(i)], expected.c[i]);
+}
+
+TEST_F(SimulateProgram, TruthTellsThePatternThatWasDrawn)
+{
+  const Sensor sensor = loadSensor("kinect_v1");
+  ASSERT_FALSE(sensor.pattern.empty());
+  make("ball", {"--random-seed", "5"});
+  const std::string shared = test::readFile(cloud_);
+  const Json waves = truth().at("sensor").at("pattern");
+  ASSERT_EQ(waves.size(), sensor.pattern.waves.size());
+  for (std::size_t i = 0; i < waves.size(); ++i) {
+    EXPECT_EQ(waves[i].at("sigma"), sensor.pattern.waves[i].sigma);
+    EXPECT_EQ(waves[i].at("length_px"), sensor.pattern.waves[i].length_px / 8);
+  }
+  EXPECT_EQ(waves[0].at("shape"), "exponential");
+  EXPECT_EQ(waves[1].at("shape"), "gaussian");
+
+  make("ball", {"--random-seed", "5", "--no-pattern"});
+  EXPECT_EQ(truth().at("sensor").at("pattern"), Json::array());
+  const std::string independent = test::readFile(cloud_);
+  EXPECT_NE(independent, shared);
+  // As from a file without one.
+  const std::string file = folder_ + "/plain.yaml";
+  const std::string text =
+      test::readFile(HOLDFAST_SOURCE_DIR "/config/sensors/kinect_v1.yaml");
+  std::ofstream(file) << text.substr(0, text.find("\n  pattern:") + 1);
+  make("ball", {"--random-seed", "5", "--sensor", file});
+  EXPECT_EQ(test::readFile(cloud_), independent);
 }
 
 TEST_F(SimulateProgram, PointsProjectToTheirPixels)

@@ -21,6 +21,45 @@ nanVector()
   return Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
 }
 
+/// The field over the pixels of the camera in which the image's rays lie.
+PatternField
+fieldOver(const RangeImage& image, const Sensor& sensor)
+{
+  constexpr double kTolerance_px = 1e-6;
+  const auto width = static_cast<std::size_t>(image.width);
+  std::vector<double> columns, rows;
+  for (std::size_t i = 0; i < image.directions.size(); ++i) {
+    const Eigen::Vector2d pixel =
+        sensor.camera.project(image.sensor_pose.R.transpose() * image.directions[i]);
+    const std::size_t u = i % width, v = i / width;
+    if (v == 0)
+      columns.push_back(pixel.x());
+    if (u == 0)
+      rows.push_back(pixel.y());
+    if (!(std::abs(pixel.x() - columns[u]) < kTolerance_px) ||
+        !(std::abs(pixel.y() - rows[v]) < kTolerance_px))
+      throw std::invalid_argument("the rays do not lie on rows and columns of sensor " +
+                                  sensor.name + ", whose noise has a pattern");
+  }
+  return {CorrelatedNoise(sensor.pattern), columns, rows};
+}
+
+/// Takes the pattern out of a point's own noise, as far as it is in it.
+void
+sharePattern(const Eigen::Vector3d& direction,
+             double variance,
+             Eigen::Matrix3d& covariance,
+             Eigen::Matrix3d& root)
+{
+  constexpr double kRounding = 1e-9;
+  const Eigen::Matrix3d shared = variance * direction * direction.transpose();
+  const Eigen::Matrix3d rest = covariance - shared;
+  root = squareRoot(rest);
+  const Eigen::Matrix3d drawn = root * root.transpose();
+  if ((drawn - rest).norm() > kRounding * covariance.norm())
+    covariance = drawn + shared;
+}
+
 } // namespace
 
 RayGrid
@@ -99,6 +138,8 @@ void
 attachNoise(RangeImage& image, const NoiseModel& noise, double noise_scale)
 {
   requireNotNegative("noise_scale", noise_scale);
+  image.pattern.reset();
+  image.pattern_directions.clear();
   const Pose& pose = image.sensor_pose;
   for (std::size_t i = 0; i < image.truth.size(); ++i) {
     if (image.hits[i] < 0)
@@ -107,6 +148,26 @@ attachNoise(RangeImage& image, const NoiseModel& noise, double noise_scale)
     image.covariances[i] =
         noise_scale * noise_scale * rotateCovariance(pose.R, camera_frame);
     image.roots[i] = squareRoot(image.covariances[i]);
+  }
+}
+
+void
+attachNoise(RangeImage& image, const Sensor& sensor, double noise_scale)
+{
+  attachNoise(image, *sensor.noise, noise_scale);
+  if (sensor.pattern.empty())
+    return;
+  image.pattern = std::make_shared<const PatternField>(fieldOver(image, sensor));
+  image.pattern_directions.assign(image.truth.size(), nanVector());
+  const Pose& pose = image.sensor_pose;
+  const double variance = sensor.pattern.variance();
+  for (std::size_t i = 0; i < image.truth.size(); ++i) {
+    if (image.hits[i] < 0)
+      continue;
+    Eigen::Vector3d& direction = image.pattern_directions[i];
+    direction = noise_scale * pose.R *
+                sensor.noise->patternDirection(pose.toLocal(image.truth[i]));
+    sharePattern(direction, variance, image.covariances[i], image.roots[i]);
   }
 }
 
@@ -129,6 +190,20 @@ drawNoise(const std::vector<Eigen::Vector3d>& truth,
       component = normal(generator);
     out[i] += roots[i] * n;
   }
+}
+
+void
+drawNoise(const RangeImage& image,
+          std::mt19937_64& generator,
+          std::vector<Eigen::Vector3d>& out)
+{
+  drawNoise(image.truth, image.roots, generator, out);
+  if (!image.pattern)
+    return;
+  std::vector<double> field;
+  image.pattern->draw(generator, field);
+  for (std::size_t i = 0; i < out.size(); ++i)
+    out[i] += field[i] * image.pattern_directions[i];
 }
 
 void
@@ -160,8 +235,8 @@ simulate(const Scene& scene,
          std::mt19937_64& generator)
 {
   RangeImage image = castRays(scene, rays, sensor.min_range_m, sensor.max_range_m);
-  attachNoise(image, *sensor.noise, options.noise_scale);
-  drawNoise(image.truth, image.roots, generator, image.points);
+  attachNoise(image, sensor, options.noise_scale);
+  drawNoise(image, generator, image.points);
   if (options.quantize)
     quantizeDisparity(image, sensor);
   return image;
