@@ -316,8 +316,29 @@ average(double& mean, double value, int count)
   mean += (value - mean) / count;
 }
 
+// The curvature matrix of a cylinder has rank one: what its entries have beside their
+// two free numbers, kxx - kyy and kxy, is no coordinate.
+StateMatrix
+freeCoordinates(PatchType type)
+{
+  const StateLayout layout = stateLayoutOf(type);
+  StateMatrix T = StateMatrix::Identity(layout.size(), layout.size());
+  if (type.surface != SurfaceType::CircularCylinder)
+    return T;
+  const int k = layout.k(), rest = layout.size() - k - 3;
+  StateMatrix free = StateMatrix::Zero(layout.size() - 1, layout.size());
+  free.topLeftCorner(k, k).setIdentity();
+  free(k, k) = 1.0;
+  free(k, k + 2) = -1.0;
+  free(k + 1, k + 1) = 1.0;
+  free.bottomRightCorner(rest, rest).setIdentity();
+  return free;
+}
+
 void
-summarizeStates(const std::vector<Trial>& trials, ConsistencyResult& result)
+summarizeStates(const std::vector<Trial>& trials,
+                PatchType type,
+                ConsistencyResult& result)
 {
   for (const double edge : kColumnEdges)
     result.by_nonlinearity.push_back({edge, 0, 0.0, 0.0, 0.0});
@@ -327,7 +348,9 @@ summarizeStates(const std::vector<Trial>& trials, ConsistencyResult& result)
     if (trial.outcome == Trial::Outcome::Failed)
       continue;
     ++usable;
-    const Normalized state = normalized(trial.state_error, trial.state_covariance);
+    const StateMatrix T = freeCoordinates(type);
+    const Normalized state =
+        normalized(T * trial.state_error, T * trial.state_covariance * T.transpose());
     average(result.state_nees_per_dof, state.nees_per_dof, usable);
     average(result.state_coverage95, state.within, usable);
     const auto at = static_cast<std::size_t>(
@@ -428,7 +451,7 @@ checkConsistency(const Scene& scene,
   result.points = reference.points;
   const std::vector<Trial> trials = runTrials(runner, reference, options);
   summarize(trials, result);
-  summarizeStates(trials, result);
+  summarizeStates(trials, type, result);
   const ParameterVector shift = tangentShift(reference.patch, reference.mean_shift);
   for (std::size_t i = 0; i < result.bias_sigma.size(); ++i) {
     const double predicted = std::sqrt(toTangent(reference.patch, reference.covariance)

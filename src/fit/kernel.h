@@ -142,6 +142,15 @@ namespace reference {
 int countLeadingValid(const Points& points);
 } // namespace reference
 
+/// A square grid of cells, row by row, with kCellRow numbers each.
+inline constexpr int kCells = 8; ///< along a side; even
+inline constexpr int kCellRow = 16; ///< a multiple of every vector
+struct CellSums {
+  alignas(64) double y[kCells * kCells][kCellRow];
+  /// Of two cells, by how many rows and columns they are apart.
+  double covariance[kCells][kCells];
+};
+
 /// The functions of the hot path, compiled for one instruction set.
 struct Kernel {
   const char* instruction_set; ///< "AVX3", "AVX2", "SSE2", ..., "scalar" (reference)
@@ -188,6 +197,11 @@ struct Kernel {
                            const Points& points,
                            const State& state,
                            double* out);
+
+  /// sum_bb' y_b C(b - b') y_b'^T over the cells of a grid, whose covariance depends on
+  /// their distance in rows and columns alone.
+  /// \param out kCellRow rows of as many.
+  void (*sumOverCells)(const CellSums& cells, double* out);
 };
 
 /// The fastest one for this processor, chosen at the first call (from any thread).

@@ -7,20 +7,15 @@
 #include <Eigen/LU>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 namespace holdfast {
 namespace {
 
-constexpr int kCells = PatternSupport::kCells;
-constexpr int kAllCells = kCells * kCells;
-
-// Padded to a multiple of vectors.
-constexpr int kRow = 16;
-using Cells = Eigen::Matrix<double, kAllCells, kRow, Eigen::RowMajor>;
-using CellCovariance = Eigen::Matrix<double, kAllCells, kAllCells, Eigen::RowMajor>;
+using kernel::kCells, kernel::kCellRow;
+using Sum = Eigen::Matrix<double, kCellRow, kCellRow, Eigen::RowMajor>;
 
 // A wave shorter than this many sides of a cell changes too much within one.
 constexpr double kShortWaveInCells = 0.5;
@@ -63,21 +58,36 @@ meanOverCells(double length, double side, double distance)
   return length / std::sqrt(spread) * std::exp(-0.5 * distance * distance / spread);
 }
 
-// Moments D_i r_i turned into the axes of R, and over N.
-void
-turnMoments(const Eigen::Matrix3d& R, int count, Cells& cells)
+// d[gradient | moments in the axes of R, over N] / d[gradient | sums of moments].
+PatternMatrix
+turnOfMoments(const Eigen::Matrix3d& R, int count)
 {
   const double scale = 1.0 / count;
-  for (int b = 0; b < kAllCells; ++b) {
-    double* moment = cells.data() + kRow * b + kernel::kMaxTheta;
-    const Eigen::Vector3d mean = R.transpose() * Eigen::Vector3d(moment);
-    const Eigen::Matrix3d S = symmetric::matrixOf(moment + 3);
-    const Eigen::Matrix3d scatter = R.transpose().lazyProduct(S.lazyProduct(R));
-    for (int k = 0; k < 3; ++k)
-      moment[k] = scale * mean[k];
-    for (int e = 0; e < symmetric::kSize; ++e)
-      moment[3 + e] = scale * scatter(symmetric::kRow[e], symmetric::kColumn[e]);
-  }
+  PatternMatrix turn = PatternMatrix::Identity();
+  turn.block<3, 3>(6, 6) = scale * R.transpose();
+  for (int e = 0; e < symmetric::kSize; ++e)
+    for (int o = 0; o < symmetric::kSize; ++o) {
+      const int i = symmetric::kRow[e], j = symmetric::kColumn[e];
+      const int b = symmetric::kRow[o], c = symmetric::kColumn[o];
+      turn(9 + e, 9 + o) =
+          scale * (R(b, i) * R(c, j) + (b == c ? 0.0 : R(c, i) * R(b, j)));
+    }
+  return turn;
+}
+
+// T Q T^T of a T that is the identity, then two blocks.
+PatternMatrix
+turned(const PatternMatrix& T, const PatternMatrix& Q)
+{
+  PatternMatrix half = Q, full;
+  half.middleRows<3>(6) = T.block<3, 3>(6, 6).lazyProduct(Q.middleRows<3>(6));
+  half.middleRows<6>(9) = T.block<6, 6>(9, 9).lazyProduct(Q.middleRows<6>(9));
+  full = half;
+  full.middleCols<3>(6) =
+      half.middleCols<3>(6).lazyProduct(T.block<3, 3>(6, 6).transpose());
+  full.middleCols<6>(9) =
+      half.middleCols<6>(9).lazyProduct(T.block<6, 6>(9, 9).transpose());
+  return full;
 }
 
 } // namespace
@@ -153,11 +163,12 @@ PatternSupport::writeExtra(PointBatch& batch) const
   }
 }
 
-// The pattern's covariance between two cells, by their distance in rows and columns.
-std::array<double, PatternSupport::kCells * PatternSupport::kCells>
-PatternSupport::covarianceOfCells(const CorrelatedNoise& noise) const
+void
+PatternSupport::writeCovariance(const CorrelatedNoise& noise,
+                                kernel::CellSums& cells) const
 {
-  std::array<double, kAllCells> sum{};
+  for (auto& row : cells.covariance)
+    std::fill(std::begin(row), std::end(row), 0.0);
   for (const CorrelatedNoise::Component& wave : noise.components()) {
     if (isShort(wave))
       continue;
@@ -166,10 +177,8 @@ PatternSupport::covarianceOfCells(const CorrelatedNoise& noise) const
       along[d] = meanOverCells(wave.length_px, side_px_, d * side_px_);
     for (int down = 0; down < kCells; ++down)
       for (int across = 0; across < kCells; ++across)
-        sum[static_cast<std::size_t>(down * kCells + across)] +=
-            wave.variance * along[down] * along[across];
+        cells.covariance[down][across] += wave.variance * along[down] * along[across];
   }
-  return sum;
 }
 
 PatternMatrix
@@ -178,21 +187,16 @@ PatternSupport::sum(const PointBatch& batch,
                     const Eigen::Matrix3d& R,
                     const double* response) const
 {
-  Cells cells = Cells::Zero();
-  addResponses(batch, response, cells.data());
-  addMoments(batch, scatter.mean, cells.data());
-  turnMoments(R, batch.size(), cells);
-  const auto by_distance = covarianceOfCells(*batch.pattern());
-  CellCovariance C;
-  for (int a = 0; a < kAllCells; ++a)
-    for (int b = 0; b < kAllCells; ++b) {
-      const int down = std::abs(a / kCells - b / kCells);
-      const int across = std::abs(a % kCells - b % kCells);
-      C(a, b) = by_distance[static_cast<std::size_t>(down * kCells + across)];
-    }
-  const Cells weighted = C.lazyProduct(cells);
-  const Eigen::Matrix<double, kRow, kRow> sum = cells.transpose().lazyProduct(weighted);
-  return sum.topLeftCorner<kPatternTerms, kPatternTerms>();
+  kernel::CellSums cells;
+  for (auto& cell : cells.y)
+    std::fill(std::begin(cell), std::end(cell), 0.0);
+  addResponses(batch, response, cells.y[0]);
+  addMoments(batch, scatter.mean, cells.y[0]);
+  writeCovariance(*batch.pattern(), cells);
+  Sum sum;
+  kernel::kernel().sumOverCells(cells, sum.data());
+  return turned(turnOfMoments(R, batch.size()),
+                sum.topLeftCorner<kPatternTerms, kPatternTerms>());
 }
 
 int
@@ -212,7 +216,7 @@ PatternSupport::addResponses(const PointBatch& batch,
   const double* v = batch.channel(PointBatch::V);
   const int padded = batch.paddedSize();
   for (int i = 0; i < batch.size(); ++i) {
-    double* cell = cells + kRow * cellOf(u[i], v[i]);
+    double* cell = cells + kCellRow * cellOf(u[i], v[i]);
     for (int a = 0; a < kernel::kMaxTheta; ++a)
       cell[a] += response[a * padded + i];
   }
@@ -233,7 +237,7 @@ PatternSupport::addMoments(const PointBatch& batch,
                               batch.channel(PointBatch::EY),
                               batch.channel(PointBatch::EZ)};
   for (int i = 0; i < batch.size(); ++i) {
-    double* moment = cells + kRow * cellOf(u[i], v[i]) + kernel::kMaxTheta;
+    double* moment = cells + kCellRow * cellOf(u[i], v[i]) + kernel::kMaxTheta;
     const double q[3] = {x[0][i] - mean[0], x[1][i] - mean[1], x[2][i] - mean[2]};
     const double r[3] = {e[0][i], e[1][i], e[2][i]};
     for (int b = 0, entry = 3; b < 3; ++b) {

@@ -18,8 +18,6 @@
 
 #include <Eigen/Core>
 
-#include <array>
-
 namespace holdfast {
 
 struct Scatter;
@@ -32,9 +30,6 @@ using PatternMatrix =
 /// How the points of a patch lie in the image, and the cells over them.
 class PatternSupport {
 public:
-  /// Cells along each side.
-  static constexpr int kCells = 8;
-
   PatternSupport() = default;
 
   /// Measures the support of a padded batch that has a pattern, and writes its channel
@@ -52,8 +47,7 @@ public:
 private:
   bool isShort(const CorrelatedNoise::Component& wave) const;
   int cellOf(double u, double v) const;
-  std::array<double, kCells * kCells> covarianceOfCells(
-      const CorrelatedNoise& noise) const;
+  void writeCovariance(const CorrelatedNoise& noise, kernel::CellSums& cells) const;
   void addResponses(const PointBatch& batch,
                     const double* response,
                     double* cells) const;
