@@ -136,6 +136,7 @@ TEST_F(CalibrateProgram, HelpTeaches)
   EXPECT_EQ(run.exit_code, 0);
   EXPECT_NE(run.out.find("Examples:"), std::string::npos);
   EXPECT_NE(run.out.find("--sensor mine.yaml"), std::string::npos);
+  EXPECT_NE(run.out.find("--pose second/"), std::string::npos);
 }
 
 TEST_F(CalibrateProgram, UsageErrorsExitWithTwo)
@@ -170,6 +171,29 @@ TEST_F(CalibrateProgram, BadFramesAreNamed)
               {base + "waves.pcd", base + "small.pcd"},
               "small.pcd: 40 x 30 pixels, where " + base + "waves.pcd has 160 x 120");
   expectError(1, {base + "waves.pcd"}, "waves.pcd: nothing large and flat");
+  const auto wall = [](int u, int v) { return 1.0 / (1.0 + 1e-3 * u + 1e-3 * v); };
+  saveCloud(base + "wall.pcd", test::makeOrganizedCloud(camera, wall));
+  saveCloud(base + "tele.pcd",
+            test::makeOrganizedCloud(test::makeCamera(160, 120, 800.0), wall));
+  const auto before = [](int u, int v) { return 0.5 / (1.0 + 1e-3 * u + 1e-3 * v); };
+  saveCloud(base + "before.pcd", test::makeOrganizedCloud(camera, before));
+  expectError(1,
+              {base + "wall.pcd", base + "tele.pcd"},
+              "tele.pcd: taken by another camera");
+  expectError(1,
+              {base + "wall.pcd", "--pose", base + "tele.pcd"},
+              "tele.pcd: taken by another camera");
+  expectError(
+      1,
+      {base + "wall.pcd", "--pose", base + "wall.pcd", "--pose", base + "small.pcd"},
+      "small.pcd: 40 x 30 pixels, where " + base + "wall.pcd has 160 x 120");
+  expectError(1,
+              {base + "wall.pcd", "--pose", base + "waves.pcd"},
+              "waves.pcd: nothing large and flat");
+  expectError(1, {base + "wall.pcd", "--pose", base + "missing.pcd"}, "missing.pcd");
+  expectError(1,
+              {base + "wall.pcd", base + "before.pcd", base + "waves.pcd"},
+              "wall.pcd and 2 more: nothing rests");
   expectError(1, {base + "small.pcd"}, "small.pcd: nothing large and flat");
 }
 
@@ -210,6 +234,57 @@ TEST_F(CalibrateProgram, RecordedTableHasItsKnownNoise)
   // Small regions see half of it.
   EXPECT_NEAR(json["by_region_size"][2]["single_frame"]["value"], 0.09, 0.005);
   EXPECT_EQ(json["by_region_size"][2]["size_px"], 32);
+}
+
+TEST_F(CalibrateProgram, RecordedTablesHaveTheirKnownPattern)
+{
+  Names arguments;
+  for (const int frame : {17, 18, 19, 20, 22})
+    arguments.push_back(
+        test::recordedCloud("mosd_static_learn" + std::to_string(frame) + ".pcd"));
+  for (const std::string other : {"cyl_learn33", "cyl_learn37", "mixed_test45"})
+    arguments.insert(arguments.end(),
+                     {"--pose", test::recordedCloud("mosd_" + other + ".pcd")});
+  if (std::count(arguments.begin(), arguments.end(), "") > 0)
+    GTEST_SKIP() << "no recorded clouds: set HOLDFAST_DATA_DIR";
+  const std::string path = folder_ + "/mine.yaml";
+  arguments.insert(arguments.end(),
+                   {"--sensor",
+                    "xtion",
+                    "-o",
+                    path,
+                    "--plot",
+                    folder_ + "/plot.svg",
+                    "--json",
+                    "-"});
+  const ProgramRun run = calibrate(arguments);
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const Json pattern = Json::parse(run.out)["pattern"];
+  ASSERT_EQ(pattern["waves"].size(), 2U) << pattern;
+  EXPECT_EQ(pattern["poses"], 4);
+  // As by maximum likelihood on one frame and by variograms about whole tables,
+  // independently: the short wave 0.09 to 0.10 px over 1.6 to 2.1 px, which is longer
+  // where less of it is taken for white noise, and the long one 0.09 to 0.10 px.
+  const Json &brief = pattern["waves"][0], &wide = pattern["waves"][1];
+  EXPECT_EQ(brief["shape"], "exponential");
+  EXPECT_NEAR(brief["sigma_px"]["value"], 0.095, 0.01) << pattern;
+  EXPECT_GT(brief["length_px"]["value"], 1.5) << pattern;
+  EXPECT_LT(brief["length_px"]["value"], 3.2) << pattern;
+  EXPECT_TRUE(contains(wide["sigma_px"], 0.1)) << pattern;
+  EXPECT_GT(wide["length_px"]["value"], 40.0) << pattern;
+  // Most of it stays with the pixels of the camera.
+  EXPECT_GT(pattern["shared_part"]["interval"][0], 0.3) << pattern;
+  EXPECT_LT(pattern["shared_part"]["interval"][1], 0.9) << pattern;
+
+  const Sensor sensor = loadSensor(path);
+  ASSERT_EQ(sensor.pattern.waves.size(), 2U);
+  EXPECT_NEAR(sensor.pattern.waves[0].sigma, brief["sigma_px"]["value"], 1e-5);
+  const auto& noise = dynamic_cast<const StereoNoiseModel&>(*sensor.noise);
+  EXPECT_NEAR(noise.parameters().sigma_disparity_px,
+              pattern["single_point_px"]["value"],
+              1e-5);
+  EXPECT_NE(test::readFile(folder_ + "/plot.svg").find("fitted pattern"),
+            std::string::npos);
 }
 
 }} // namespace holdfast

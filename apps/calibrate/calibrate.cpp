@@ -15,6 +15,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -29,6 +31,10 @@ constexpr const char* kHelp =
 the picture if you like, and record some frames without touching anything. One frame
 tells how far the disparities of a plane scatter; several tell how much of that changes
 with time and how much is a fixed pattern of the camera, which no averaging removes.
+What neighbouring pixels share of their error, waves of some length over the image, is
+measured on planes and written as the sensor's `pattern`. The shape of the surfaces is
+part of it, unless frames from other places, --pose, tell them apart: the pattern stays
+with the pixels. Planes should fill most of the picture.
 
 Examples:
   holdfast calibrate --device 1                          how large is the noise?
@@ -36,10 +42,12 @@ Examples:
   holdfast calibrate frames/ --sensor xtion -o mine.yaml
   holdfast fit cloud.pcd --sensor mine.yaml              and now use it
   holdfast calibrate frames/ --plot noise.svg --json noise.json
+  holdfast calibrate first/ --pose second/ --pose third/ -o mine.yaml
 )";
 
 struct CalibrateSettings {
-  InputOptions input;
+  InputOptions input; ///< with the frames of the first pose
+  std::vector<std::vector<std::string>> other_poses;
 #ifdef HOLDFAST_HAVE_OPENNI2
   Openni2Options device;
   int frames = 30;
@@ -58,66 +66,126 @@ sizeText(const RangeCloud& cloud)
          std::to_string(cloud.points->height);
 }
 
-/// The frames, all organized and of one size, in the order given.
-struct Recording {
-  std::vector<std::string> paths;
-  std::vector<RangeCloud> clouds;
+/// Intrinsics recovered from points of one camera agree by much more.
+bool
+isSameCamera(const Camera& a, const Camera& b)
+{
+  constexpr double kFocalRatio = 0.02, kMiddlePx = 8.0;
+  return std::abs(a.fx / b.fx - 1.0) < kFocalRatio &&
+         std::abs(a.fy / b.fy - 1.0) < kFocalRatio &&
+         std::abs(a.cx - b.cx) < kMiddlePx && std::abs(a.cy - b.cy) < kMiddlePx;
+}
+
+/// The frames of all poses, all organized, of one size and one camera, in the order
+/// given.
+class Recording {
+public:
+  explicit Recording(const Sensor& nominal) : nominal_(nominal) {}
+
+  void beginPose()
+  {
+    poses_.emplace_back();
+    paths_.emplace_back();
+  }
 
   void add(const std::string& path, RangeCloud cloud)
   {
     if (cloud.points->height < 2)
       throw std::runtime_error(path + ": not organized, the pixels of its points are "
                                       "lost");
-    if (!clouds.empty() && sizeText(cloud) != sizeText(clouds.front()))
-      throw std::runtime_error(path + ": " + sizeText(cloud) + " pixels, where " +
-                               paths.front() + " has " + sizeText(clouds.front()));
-    paths.push_back(path);
-    clouds.push_back(std::move(cloud));
+    if (poses_.front().empty())
+      sensor_ = matchedSensor(nominal_, cloud, &notice_);
+    else
+      requireSameAsFirst(path, cloud);
+    paths_.back().push_back(path);
+    poses_.back().push_back(std::move(cloud));
   }
 
-  std::string name() const
+  const std::vector<std::vector<RangeCloud>>& poses() const
   {
-    const std::size_t others = paths.size() - 1;
-    return others == 0 ? paths.front() :
-                         paths.front() + " and " + std::to_string(others) + " more";
+    return poses_;
   }
+
+  /// That of the frames.
+  const Sensor& sensor() const
+  {
+    return sensor_;
+  }
+
+  /// Of the sensor, for the user; may be empty.
+  std::string notice() const
+  {
+    return notice_.empty() ? "" : paths_.front().front() + ": " + notice_;
+  }
+
+  std::string name(std::size_t pose) const
+  {
+    const std::size_t others = paths_[pose].size() - 1;
+    const std::string& first = paths_[pose].front();
+    return others == 0 ? first : first + " and " + std::to_string(others) + " more";
+  }
+
+private:
+  void requireSameAsFirst(const std::string& path, const RangeCloud& cloud) const
+  {
+    const RangeCloud& first = poses_.front().front();
+    const std::string& first_path = paths_.front().front();
+    if (sizeText(cloud) != sizeText(first))
+      throw std::runtime_error(path + ": " + sizeText(cloud) + " pixels, where " +
+                               first_path + " has " + sizeText(first));
+    const Camera other = matchedSensor(nominal_, cloud).camera;
+    if (!isSameCamera(other, sensor_.camera))
+      throw std::runtime_error(
+          path + ": taken by another camera, with a focal length of " +
+          formatNumber("%.1f px about column ", other.fx) +
+          formatNumber("%.1f,", other.cx) + " where " + first_path + " has " +
+          formatNumber("%.1f px about ", sensor_.camera.fx) +
+          formatNumber("%.1f", sensor_.camera.cx));
+  }
+
+  Sensor nominal_;
+  Sensor sensor_;
+  std::string notice_;
+  std::vector<std::vector<std::string>> paths_; ///< by pose
+  std::vector<std::vector<RangeCloud>> poses_;
 };
 
 /// All frames, or nothing when one of them cannot be used, which has been said then.
 std::optional<Recording>
-loadRecording(const InputOptions& input, const Sensor& sensor, bool quiet)
+loadRecording(const CalibrateSettings& settings, const Sensor& nominal)
 {
-  Recording recording;
-  const int exit_code = forEachCloud(input.clouds, [&](const std::string& path) {
-    CloudFileInfo info;
-    RangeCloud cloud = loadCloud(path, loadOptions(input, sensor), &info);
-    if (!quiet)
-      for (const std::string& notice : inputNotices(input, info))
-        printNotice(path + ": " + notice);
-    recording.add(path, std::move(cloud));
-    return true;
-  });
-  // Without a frame that was meant to be there, the result would be another one.
-  return exit_code == 0 ? std::optional(recording) : std::nullopt;
+  std::vector<std::vector<std::string>> poses = settings.other_poses;
+  poses.insert(poses.begin(), settings.input.clouds);
+  Recording recording(nominal);
+  for (const std::vector<std::string>& paths : poses) {
+    recording.beginPose();
+    const int exit_code = forEachCloud(paths, [&](const std::string& path) {
+      CloudFileInfo info;
+      RangeCloud cloud = loadCloud(path, loadOptions(settings.input, nominal), &info);
+      if (!settings.quiet)
+        for (const std::string& notice : inputNotices(settings.input, info))
+          printNotice(path + ": " + notice);
+      recording.add(path, std::move(cloud));
+      return true;
+    });
+    // Without a frame that was meant to be there, the result would be another one.
+    if (exit_code != 0)
+      return std::nullopt;
+  }
+  return recording;
 }
 
 NoiseReport
-calibrate(const Recording& recording,
-          const Sensor& nominal,
-          const CalibrateSettings& settings)
+calibrate(const Recording& recording, const CalibrateSettings& settings)
 {
-  std::string notice;
-  const Sensor sensor = matchedSensor(nominal, recording.clouds.front(), &notice);
-  try {
-    const NoiseReport report =
-        measureNoise(recording.clouds, sensor, settings.region_px);
-    if (!notice.empty() && !settings.quiet)
-      printNotice(recording.paths.front() + ": " + notice);
-    return report;
-  }
-  catch (const std::runtime_error& error) {
-    throw std::runtime_error(recording.name() + ": " + error.what());
-  }
+  const NoiseReport report = measureNoise(
+      recording.poses(),
+      recording.sensor(),
+      settings.region_px,
+      [&](int pose) { return recording.name(static_cast<std::size_t>(pose)); });
+  if (!recording.notice().empty() && !settings.quiet)
+    printNotice(recording.notice());
+  return report;
 }
 
 #ifdef HOLDFAST_HAVE_OPENNI2
@@ -126,7 +194,9 @@ calibrateCamera(const CalibrateSettings& settings, Sensor sensor)
 {
   const std::vector<RangeCloud> frames =
       captureFrames(settings.device, settings.frames, settings.quiet, sensor.camera);
-  return measureNoise(frames, sensor, settings.region_px);
+  return measureNoise({frames}, sensor, settings.region_px, [](int) {
+    return std::string("the camera");
+  });
 }
 
 void
@@ -141,7 +211,7 @@ addCameraOptions(CLI::App& command, CalibrateSettings& settings)
       ->capture_default_str()
       ->group("Camera");
   // One or the other: a camera is asked for by its option, be it the first.
-  command.get_option("--device")->excludes("CLOUD");
+  command.get_option("--device")->excludes("CLOUD")->excludes("--pose");
   command.get_option("CLOUD")->required(false);
 }
 #endif
@@ -156,11 +226,10 @@ measure(const CalibrateSettings& settings, const Sensor& nominal)
   if (settings.input.clouds.empty())
     throw CLI::RequiredError("CLOUD or --device");
 #endif
-  const std::optional<Recording> recording =
-      loadRecording(settings.input, nominal, settings.quiet);
+  const std::optional<Recording> recording = loadRecording(settings, nominal);
   if (!recording)
     return std::nullopt;
-  return calibrate(*recording, nominal, settings);
+  return calibrate(*recording, settings);
 }
 
 int
@@ -221,7 +290,11 @@ addOutputOptions(CLI::App& command, CalibrateSettings& settings)
                   "Write a sensor file with the measured noise, for --sensor")
       ->type_name("SENSOR.yaml")
       ->group(group);
-  command.add_option("--plot", settings.plot_path, "Draw the noise over the depth")
+  command
+      .add_option("--plot",
+                  settings.plot_path,
+                  "Draw the noise over the depth, and what pixels share over "
+                  "their distance")
       ->check(CLI::Validator(requireSvg, "FILE.svg"))
       ->type_name("")
       ->group(group);
@@ -239,6 +312,13 @@ addCalibrateCommand(CLI::App& app, int& exit_code)
   command->footer(kHelp);
   const auto settings = std::make_shared<CalibrateSettings>();
   addInputOptions(*command, settings->input);
+  command
+      ->add_option("--pose",
+                   settings->other_poses,
+                   "Frames of another scene or from another place, as CLOUD; once for "
+                   "each pose")
+      ->type_name("CLOUD")
+      ->group("Input");
 #ifdef HOLDFAST_HAVE_OPENNI2
   addCameraOptions(*command, *settings);
 #endif

@@ -2,6 +2,8 @@
 
 #include "command_line.h"
 #include "console.h"
+#include "estimate_text.h"
+#include "pattern_report.h"
 
 #include <holdfast/io/config.h>
 #include <holdfast/sensor/stereo_noise_model.h>
@@ -16,39 +18,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 using Table = std::vector<std::vector<std::string>>;
-
-std::string
-digits(double value)
-{
-  return formatNumber("%#.3g", value);
-}
-
-/// With no more digits than mean anything.
-double
-rounded(double value)
-{
-  return parseNumber<double>(formatNumber("%.5g", value)).value_or(value);
-}
-
-std::string
-valueText(const Estimate& estimate)
-{
-  return estimate.isKnown() ? digits(estimate.value) : "-";
-}
-
-std::string
-intervalText(const Estimate& estimate)
-{
-  return std::isfinite(estimate.low) ?
-             digits(estimate.low) + " to " + digits(estimate.high) :
-             "-";
-}
-
-std::string
-valueAndInterval(const Estimate& estimate)
-{
-  return valueText(estimate) + " (" + intervalText(estimate) + ")";
-}
 
 PointImage
 cameraFrame(const RangeCloud& cloud)
@@ -260,18 +229,9 @@ sentences(const NoiseReport& report)
   all.push_back(depthSentence(report));
   all.push_back(stepSentence(report));
   all.push_back(pointSentence(report));
+  for (const std::string& sentence : patternSentences(report))
+    all.push_back(sentence);
   return all;
-}
-
-Json
-estimateJson(const Estimate& estimate)
-{
-  if (!estimate.isKnown())
-    return nullptr;
-  Json interval;
-  if (std::isfinite(estimate.low))
-    interval = {estimate.low, estimate.high};
-  return {{"value", estimate.value}, {"interval", interval}};
 }
 
 Json
@@ -378,6 +338,13 @@ commentsOf(const NoiseReport& report)
                  " of it changes from frame to frame, " +
                  valueAndInterval(found.sigmas.fixed) + " is a fixed pattern.";
   comments["noise.sigma_disparity_px"] = disparity + " " + depthSentence(report);
+  if (report.hasPattern()) {
+    comments["noise.sigma_disparity_px"] =
+        "Of a single point, white part and pattern: " +
+        valueAndInterval(report.pattern.single) + ". " +
+        comments["noise.sigma_disparity_px"];
+    comments["noise.pattern"] = patternComment(report);
+  }
   comments["noise.sigma_point_px"] =
       found.sigma_point.isKnown() ?
           "Scatter across the rays: " + valueAndInterval(found.sigma_point) + "." :
@@ -387,31 +354,54 @@ commentsOf(const NoiseReport& report)
 
 } // namespace
 
-NoiseReport
-measureNoise(const std::vector<RangeCloud>& clouds, const Sensor& sensor, int region_px)
+namespace {
+
+/// \throw std::runtime_error for all but Ok.
+void
+requireOk(NoiseCalibrationStatus status, const std::string& frames)
 {
-  std::vector<PointImage> frames;
-  for (const RangeCloud& cloud : clouds)
-    frames.push_back(cameraFrame(cloud));
+  switch (status) {
+  case NoiseCalibrationStatus::NothingStatic:
+    throw std::runtime_error(
+        frames +
+        ": nothing rests in most of the frames; did the camera move? Frames from "
+        "another place belong to a --pose of their own");
+  case NoiseCalibrationStatus::NothingFlat:
+    throw std::runtime_error(frames + ": nothing large and flat to measure on; show "
+                                      "the camera a wall, a table or the "
+                                      "floor");
+  case NoiseCalibrationStatus::Ok:
+    break;
+  }
+}
+
+} // namespace
+
+NoiseReport
+measureNoise(const std::vector<std::vector<RangeCloud>>& poses,
+             const Sensor& sensor,
+             int region_px,
+             const std::function<std::string(int pose)>& poseName)
+{
+  std::vector<PoseFrames> images;
+  for (const std::vector<RangeCloud>& pose : poses) {
+    PoseFrames& frames = images.emplace_back();
+    for (const RangeCloud& cloud : pose)
+      frames.push_back(cameraFrame(cloud));
+  }
+  const PoseFrames& frames = images.front();
   NoiseCalibrationOptions options;
   options.camera = sensor.camera;
   options.baseline_m = sensor.baseline_m;
   options.focal_px = sensor.disparity_focal_px;
   options.region_px = region_px;
-  NoiseReport report{calibrateNoise(frames, options), sensor};
+  NoiseReport report{calibrateNoise(frames, options), {}, sensor};
   report.sensor.camera.width = frames.front().width;
   report.sensor.camera.height = frames.front().height;
-  switch (report.found.status) {
-  case NoiseCalibrationStatus::NothingStatic:
-    throw std::runtime_error(
-        "nothing rests in most of the frames; did the camera move?");
-  case NoiseCalibrationStatus::NothingFlat:
-    throw std::runtime_error(
-        "nothing large and flat to measure on; show the camera a wall, a table or the "
-        "floor");
-  case NoiseCalibrationStatus::Ok:
-    break;
-  }
+  requireOk(report.found.status, poseName(0));
+  report.pattern = calibratePattern(images, options);
+  if (report.pattern.pose > 0)
+    requireOk(report.pattern.status, poseName(report.pattern.pose));
   return report;
 }
 
@@ -419,7 +409,8 @@ std::string
 noiseReportText(const NoiseReport& report)
 {
   std::string text = headText(report) + "\n\n" + formatTable(sigmaTable(report)) +
-                     "\n" + formatTable(sizeTable(report)) + "\n" +
+                     "\n" + formatTable(patternTable(report)) + "\n" +
+                     formatTable(sizeTable(report)) + "\n" +
                      formatTable(depthTable(report)) + "\n";
   for (const std::string& sentence : sentences(report))
     text += sentence + "\n";
@@ -457,6 +448,7 @@ noiseReportJson(const NoiseReport& report)
           {"quantum_px", estimateJson(found.quantum)},
           {"sigma_point_px", estimateJson(found.sigma_point)},
           {"depth_exponent", estimateJson(found.depth_exponent)},
+          {"pattern", patternJson(report)},
           {"by_region_size", sizes},
           {"by_depth", depths},
           {"remarks", sentences(report)}};
@@ -465,23 +457,31 @@ noiseReportJson(const NoiseReport& report)
 Plot
 noiseReportPlot(const NoiseReport& report)
 {
-  return {{depthPanel(report, "Disparity, with 95 % intervals", "px", disparityScale),
-           depthPanel(report, "The same as depth", "mm", depthScale)},
-          2};
+  Plot plot{{depthPanel(report, "Disparity, with 95 % intervals", "px", disparityScale),
+             depthPanel(report, "The same as depth", "mm", depthScale)},
+            2};
+  for (const Panel& panel : patternPanels(report))
+    plot.panels.push_back(panel);
+  return plot;
 }
 
 void
 saveCalibratedSensor(const std::string& path, const NoiseReport& report)
 {
   const NoiseCalibration& found = report.found;
+  Sensor sensor = report.sensor;
   StereoNoiseModel::Parameters noise;
-  noise.sigma_disparity_px = rounded(found.sigmas.single.value);
+  sensor.pattern = roundedPattern(report);
+  noise.sigma_disparity_px = rounded(
+      (report.hasPattern() ? report.pattern.single : found.sigmas.single).value);
+  // Rounding must not make the whole less than its part.
+  noise.sigma_disparity_px =
+      std::max(noise.sigma_disparity_px, std::sqrt(sensor.pattern.variance()));
   noise.sigma_point_px = found.sigma_point.isKnown() ?
                              rounded(found.sigma_point.value) :
                              nominalSigmaPoint(report.sensor);
   noise.baseline_m = report.sensor.baseline_m;
   noise.focal_px = report.sensor.disparity_focal_px;
-  Sensor sensor = report.sensor;
   sensor.name = std::filesystem::path(path).stem().string();
   sensor.disparity_quantum_px =
       found.quantum.isKnown() ? rounded(found.quantum.value) : 0.0;

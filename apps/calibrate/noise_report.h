@@ -5,27 +5,38 @@
 
 #include <holdfast/pcl/range_cloud.h>
 #include <holdfast/sensor/noise_calibration.h>
+#include <holdfast/sensor/pattern_calibration.h>
 #include <holdfast/sensor/sensor.h>
 
 #include <nlohmann/json.hpp>
 
+#include <functional>
 #include <string>
 #include <vector>
 
 namespace holdfast::app {
 
 struct NoiseReport {
-  NoiseCalibration found;
+  NoiseCalibration found; ///< in the first pose
+  PatternCalibration pattern; ///< in all; not Ok where the first has only small spots
   Sensor sensor; ///< the one assumed, with the camera of the frames
+
+  /// Whether neighbouring pixels share anything.
+  bool hasPattern() const
+  {
+    return !pattern.waves.empty();
+  }
 };
 
-/// Measures the noise in organized clouds of one resting scene.
-/// \param sensor nominal; its camera should be that of the clouds (matchedSensor).
-/// \throw std::runtime_error when the clouds hold nothing that rests and is flat.
-/// \throw std::invalid_argument when their sizes differ, or there is none.
-NoiseReport measureNoise(const std::vector<RangeCloud>& clouds,
+/// Measures the noise in organized clouds of resting scenes, one or more frames of
+/// each. \param sensor nominal; its camera should be that of the clouds
+/// (matchedSensor). \param poseName the frames of a pose in a message. \throw
+/// std::runtime_error when a scene holds nothing that rests and is flat. \throw
+/// std::invalid_argument when their sizes differ, or there is none.
+NoiseReport measureNoise(const std::vector<std::vector<RangeCloud>>& poses,
                          const Sensor& sensor,
-                         int region_px);
+                         int region_px,
+                         const std::function<std::string(int pose)>& poseName);
 
 /// Tables and what they mean.
 std::string noiseReportText(const NoiseReport& report);
@@ -33,7 +44,8 @@ std::string noiseReportText(const NoiseReport& report);
 /// All numbers; unknown ones are null.
 nlohmann::ordered_json noiseReportJson(const NoiseReport& report);
 
-/// Sigmas of disparity and depth over the depth, with the model's curves.
+/// Sigmas of disparity and depth over the depth, with the model's curves, and what
+/// neighbouring pixels share over their distance.
 Plot noiseReportPlot(const NoiseReport& report);
 
 /// A sensor file with the measured noise and where each figure came from. The sensor is

@@ -1,5 +1,6 @@
 #include <holdfast/sensor/noise_calibration.h>
 
+#include "noise_calibration/frames.h"
 #include "noise_calibration/step.h"
 #include "noise_calibration/sums.h"
 
@@ -178,6 +179,8 @@ addSigmas(const std::vector<CellSums>& cells, NoiseCalibration& result)
   result.depth_exponent = jackknife(cells, depthExponent);
 }
 
+} // namespace
+
 void
 requireSameSizes(const std::vector<PointImage>& frames)
 {
@@ -193,8 +196,6 @@ requireSameSizes(const std::vector<PointImage>& frames)
       throw std::invalid_argument("a frame has not width * height points");
   }
 }
-
-} // namespace
 
 std::string
 validityError(const NoiseCalibrationOptions& options)

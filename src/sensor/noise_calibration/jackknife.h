@@ -23,6 +23,11 @@ struct CellSums {
 Estimate jackknife(const std::vector<CellSums>& cells,
                    const std::function<double(const Eigen::ArrayXd&)>& statistic);
 
+/// The same for several numbers at once.
+std::vector<Estimate> jackknifeAll(
+    const std::vector<CellSums>& cells,
+    const std::function<Eigen::ArrayXd(const Eigen::ArrayXd&)>& statistics);
+
 /// From a variance to a standard deviation; below zero is zero.
 Estimate rootOf(const Estimate& variance);
 

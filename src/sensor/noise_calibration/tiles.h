@@ -29,6 +29,10 @@ struct Tile {
 inline constexpr int kCellColumns = 8;
 inline constexpr int kCellRows = 6;
 
+/// Larger ones where waves of some 60 px are to be told, which reach across the others.
+inline constexpr int kPatternColumns = 4;
+inline constexpr int kPatternRows = 3;
+
 struct TileImage {
   int columns = 0;
   int rows = 0;
@@ -47,8 +51,20 @@ struct TileImage {
   /// Number of the cell of a tile, row by row.
   int cellOf(int index) const
   {
-    return index / columns * kCellRows / rows * kCellColumns +
-           index % columns * kCellColumns / columns;
+    return cellOf(index, kCellColumns, kCellRows);
+  }
+
+  /// The same for larger cells.
+  int patternCellOf(int index) const
+  {
+    return cellOf(index, kPatternColumns, kPatternRows);
+  }
+
+private:
+  int cellOf(int index, int cell_columns, int cell_rows) const
+  {
+    return index / columns * cell_rows / rows * cell_columns +
+           index % columns * cell_columns / columns;
   }
 };
 
@@ -59,6 +75,16 @@ public:
   /// Leaves out what single frames saw differently. Pixels without enough frames: none.
   DisparityStack(const std::vector<PointImage>& frames,
                  const NoiseCalibrationOptions& options);
+
+  int width() const
+  {
+    return width_;
+  }
+
+  int height() const
+  {
+    return height_;
+  }
 
   int frames() const
   {

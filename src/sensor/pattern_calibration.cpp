@@ -1,0 +1,426 @@
+#include <holdfast/sensor/pattern_calibration.h>
+
+#include "noise_calibration/contrasts.h"
+#include "noise_calibration/frames.h"
+#include "noise_calibration/wave_fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+
+namespace holdfast {
+namespace {
+
+// Longer steps that only so small a part of the pixels allow say little.
+constexpr double kLeastTriples = 0.05;
+constexpr double kLeastPairs = 0.05;
+
+// Second differences are fitted over short distances; what is further apart, the blocks
+// tell with less uncertainty.
+constexpr double kLongestDifference = 24.0; // px
+
+// Over shorter distances, what changes with time hides what poses share.
+constexpr double kLeastShared = 8.0; // px
+
+// A length as close to the longest that is searched was not found but cut off.
+constexpr double kCutOff = 1e-3;
+
+constexpr int kReweightings = 3;
+
+/// The sums of contrastSums(), then those of a BlockCorrelogram.
+const Eigen::Index kDifferences = static_cast<Eigen::Index>(contrastSteps().size());
+const Eigen::Index kRows = kDifferences + kBlockBins;
+
+Eigen::ArrayXd
+column(const Eigen::ArrayXd& sums, ContrastSum which)
+{
+  return Eigen::Map<const Eigen::ArrayXd, 0, Eigen::InnerStride<kContrastSums>>(
+      sums.data() + which,
+      kDifferences);
+}
+
+Eigen::ArrayXd
+column(const Eigen::ArrayXd& sums, BlockSum which)
+{
+  return Eigen::Map<const Eigen::ArrayXd, 0, Eigen::InnerStride<kBlockSums>>(
+      sums.data() + kDifferences * kContrastSums + which,
+      kBlockBins);
+}
+
+double
+distanceOf(Eigen::Index difference)
+{
+  return contrastSteps()[static_cast<std::size_t>(difference)].distance();
+}
+
+/// Of second differences, over six; NaN where nothing was summed.
+Eigen::ArrayXd
+meansOf(const Eigen::ArrayXd& sums, ContrastSum total, ContrastSum count)
+{
+  return column(sums, total) / column(sums, count) / 6.0;
+}
+
+/// All that is fitted.
+Eigen::ArrayXd
+meansOf(const Eigen::ArrayXd& sums)
+{
+  Eigen::ArrayXd means(kRows);
+  means << meansOf(sums, WithinFrame, WithinFrames),
+      column(sums, BlockProducts) / column(sums, BlockPairs);
+  return means;
+}
+
+/// Only second differences.
+Eigen::ArrayXd
+meansOfDifferences(const Eigen::ArrayXd& sums, ContrastSum total, ContrastSum count)
+{
+  Eigen::ArrayXd means =
+      Eigen::ArrayXd::Constant(kRows, std::numeric_limits<double>::quiet_NaN());
+  means.head(kDifferences) = meansOf(sums, total, count);
+  return means;
+}
+
+PatternData
+dataOf(const Eigen::ArrayXd& means, const Eigen::ArrayXd& weights)
+{
+  // A cell that is left out may have been the only one with such a distance.
+  const auto is_there = means.isFinite();
+  return {is_there.select(means, 0.0), is_there.select(weights, 0.0)};
+}
+
+/// Variances of the rows but for one factor. For second differences relative to their
+/// squares and as a power of the distance, for blocks the same for all: those of single
+/// rows are too uncertain to weigh by. Infinite: not to be used.
+Eigen::ArrayXd
+rowVariances(const std::vector<CellSums>& cells, const Eigen::ArrayXd& total)
+{
+  const auto all = [](const Eigen::ArrayXd& sums) { return meansOf(sums); };
+  const std::vector<Estimate> means = jackknifeAll(cells, all);
+  const Eigen::ArrayXd counts = column(total, WithinFrames);
+  const Eigen::ArrayXd pairs = column(total, BlockPairs);
+  Eigen::Matrix2d A = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d b = Eigen::Vector2d::Zero();
+  double blocks = 0.0, block_rows = 0.0;
+  Eigen::ArrayXd variances =
+      Eigen::ArrayXd::Constant(kRows, std::numeric_limits<double>::infinity());
+  for (Eigen::Index a = 0; a < kRows; ++a) {
+    const Estimate& mean = means[static_cast<std::size_t>(a)];
+    const double error = mean.high - mean.low;
+    if (!(error > 0.0))
+      continue;
+    if (a >= kDifferences && pairs[a - kDifferences] >= kLeastPairs * pairs[0]) {
+      blocks += error * error;
+      block_rows += 1.0;
+      variances[a] = 1.0;
+    }
+    if (a < kDifferences && distanceOf(a) <= kLongestDifference &&
+        counts[a] >= kLeastTriples * counts[0]) {
+      const Eigen::Vector2d terms(1.0, std::log(distanceOf(a)));
+      A += terms * terms.transpose();
+      b += 2.0 * std::log(error / mean.value) * terms;
+      variances[a] = 1.0;
+    }
+  }
+  const Eigen::Vector2d power = A.fullPivLu().solve(b);
+  for (Eigen::Index a = 0; a < kRows; ++a)
+    variances[a] *= a < kDifferences ?
+                        std::exp(power[0] + power[1] * std::log(distanceOf(a))) :
+                        blocks / block_rows;
+  return variances;
+}
+
+/// What all poses show on planes, or the pose that shows nothing.
+struct Observed {
+  NoiseCalibrationStatus status = NoiseCalibrationStatus::Ok;
+  int pose = 0;
+  std::vector<PlaneImages> images;
+  BlockCorrelogramBuilder blocks;
+};
+
+Observed
+observe(const std::vector<PoseFrames>& poses, const NoiseCalibrationOptions& options)
+{
+  Observed observed;
+  for (const PoseFrames& pose : poses) {
+    const DisparityStack stack(pose, options);
+    const TileImage tiles = stack.tiles(pose, options);
+    const FlatRegions flat = findFlatRegions(tiles, options);
+    if (!flat.are_planes) {
+      const bool is_static = std::any_of(tiles.tiles.begin(),
+                                         tiles.tiles.end(),
+                                         [](const Tile& tile) { return tile.usable; });
+      observed.status = is_static ? NoiseCalibrationStatus::NothingFlat :
+                                    NoiseCalibrationStatus::NothingStatic;
+      return observed;
+    }
+    observed.images.push_back(planeImages(stack, tiles, flat.regions));
+    for (const Region& plane : flat.regions)
+      observed.blocks.add(tiles, plane);
+    ++observed.pose;
+  }
+  observed.pose = 0;
+  return observed;
+}
+
+/// Sums by cell, those of the blocks behind those of the differences.
+std::vector<CellSums>
+joined(std::vector<CellSums> cells, const std::vector<CellSums>& blocks)
+{
+  for (std::size_t k = 0; k < cells.size(); ++k) {
+    Eigen::ArrayXd both(cells[k].sums.size() + blocks[k].sums.size());
+    both << cells[k].sums, blocks[k].sums;
+    cells[k].sums = both;
+  }
+  return cells;
+}
+
+/// The fit of the whole and, by delete-one, what its numbers are uncertain by.
+class PatternFit {
+public:
+  PatternFit(const std::vector<CellSums>& cells, const PatternDesign& design)
+  : cells_(cells), design_(design)
+  {
+    total_ = Eigen::ArrayXd::Zero(cells.front().sums.size());
+    for (const CellSums& cell : cells)
+      total_ += cell.sums;
+    variances_ = rowVariances(cells, total_);
+    weigh(meansOf(total_));
+  }
+
+  /// The better of the shapes.
+  void fit(const std::vector<std::vector<PatternShape>>& candidates)
+  {
+    const PatternData changes = changesOf(total_);
+    if (!hasFrames(total_))
+      temporal_ = {};
+    else
+      temporal_ = fitWaves(design_, changes, {PatternShape::Exponential});
+    std::optional<WaveFit> best;
+    for (int round = 0; round < kReweightings; ++round) {
+      best.reset();
+      for (const auto& shapes : candidates) {
+        WaveFit tried = fitWaves(design_, aboveFloor(total_, temporal_.white), shapes);
+        if (!best || tried.error < best->error)
+          best = std::move(tried);
+      }
+      weigh(temporal_.white * design_.white() + best->expected(design_));
+    }
+    fit_ = *best;
+    estimates_ = jackknifeAll(cells_, [&](const Eigen::ArrayXd& sums) {
+      return numbersOf(sums);
+    });
+  }
+
+  bool hasOnlyWaves() const
+  {
+    for (std::size_t m = 0; m < waves(); ++m) {
+      if (!(estimates_[2 + 2 * waves() + m].low > 0.0))
+        return false;
+    }
+    return true;
+  }
+
+  void write(PatternCalibration& result) const
+  {
+    result.single = rootOf(estimates_[0]);
+    result.white = rootOf(estimates_[1]);
+    for (std::size_t m = 0; m < waves(); ++m) {
+      result.waves.push_back({rootOf(estimates_[2 + m]),
+                              lengthOf(estimates_[2 + waves() + m]),
+                              fit_.shapes[m]});
+    }
+    result.shared_part = estimates_.back();
+    const Eigen::ArrayXd expected =
+        temporal_.white * design_.white() + fit_.expected(design_);
+    for (std::size_t a = 0; a < result.rows.size(); ++a)
+      result.rows[a].fitted = expected[static_cast<Eigen::Index>(a)];
+    for (std::size_t a = 0; a < result.distant.size(); ++a)
+      result.distant[a].fitted = expected[kDifferences + static_cast<Eigen::Index>(a)];
+  }
+
+private:
+  std::size_t waves() const
+  {
+    return fit_.shapes.size();
+  }
+
+  static Estimate lengthOf(const Estimate& log_length)
+  {
+    Estimate length;
+    length.value = std::exp(log_length.value);
+    if (length.value < (1.0 - kCutOff) * kLongestWave) {
+      length.low = std::exp(log_length.low);
+      length.high = std::exp(log_length.high);
+    }
+    return length;
+  }
+
+  /// NaN without a second pose.
+  static double sharedPart(const Eigen::ArrayXd& sums)
+  {
+    const Eigen::ArrayXd poses = meansOf(sums, BetweenPoses, BetweenPoseCount);
+    const Eigen::ArrayXd within = meansOf(sums, WithinFrame, WithinFrames);
+    double shared = 0.0, whole = 0.0;
+    for (Eigen::Index a = 0; a < kDifferences; ++a)
+      if (distanceOf(a) >= kLeastShared && std::isfinite(poses[a])) {
+        shared += poses[a];
+        whole += within[a];
+      }
+    return shared / whole;
+  }
+
+  static bool hasFrames(const Eigen::ArrayXd& sums)
+  {
+    return column(sums, BetweenFrameCount)[0] > 0.0;
+  }
+
+  PatternData changesOf(const Eigen::ArrayXd& sums) const
+  {
+    return dataOf(meansOfDifferences(sums, BetweenFrames, BetweenFrameCount), weights_);
+  }
+
+  /// What is left for the fit when so much is known to be white.
+  PatternData aboveFloor(const Eigen::ArrayXd& sums, double white) const
+  {
+    return dataOf(meansOf(sums) - white * design_.white(), weights_);
+  }
+
+  /// By values that were fitted, at last: weights by the measured ones would prefer the
+  /// low ones.
+  void weigh(const Eigen::ArrayXd& values)
+  {
+    Eigen::ArrayXd variances = variances_;
+    variances.head(kDifferences) *= values.head(kDifferences).square();
+    weights_ = (variances > 0.0 && variances.isFinite()).select(1.0 / variances, 0.0);
+  }
+
+  Eigen::ArrayXd numbersOf(const Eigen::ArrayXd& sums) const
+  {
+    const WaveFit temporal =
+        hasFrames(sums) ? refitWaves(design_, changesOf(sums), temporal_) : WaveFit{};
+    const WaveFit fit = refitWaves(design_, aboveFloor(sums, temporal.white), fit_);
+    // Long waves and their lengths are known together less well than that there are
+    // any.
+    const WaveFit at_lengths = fitVariances(design_,
+                                            aboveFloor(sums, temporal.white),
+                                            fit_.shapes,
+                                            fit_.log_lengths);
+    Eigen::ArrayXd numbers(static_cast<Eigen::Index>(3 + 3 * fit.shapes.size()));
+    Eigen::Index k = 0;
+    numbers[k++] = temporal.white + fit.single();
+    numbers[k++] = temporal.white + fit.white;
+    for (const double variance : fit.variances)
+      numbers[k++] = variance;
+    for (const double length : fit.log_lengths)
+      numbers[k++] = length;
+    for (const double variance : at_lengths.variances)
+      numbers[k++] = variance;
+    numbers[k++] = sharedPart(sums);
+    return numbers;
+  }
+
+  const std::vector<CellSums>& cells_;
+  const PatternDesign& design_;
+  Eigen::ArrayXd total_;
+  Eigen::ArrayXd variances_;
+  Eigen::ArrayXd weights_;
+  WaveFit temporal_; ///< its white part is the least of the whole
+  WaveFit fit_; ///< what is above that
+  std::vector<Estimate> estimates_; ///< of numbersOf()
+};
+
+std::vector<PatternRow>
+rowsOf(const std::vector<CellSums>& cells)
+{
+  const auto estimates = [&](ContrastSum total, ContrastSum count) {
+    return jackknifeAll(cells, [=](const Eigen::ArrayXd& sums) {
+      return meansOf(sums, total, count);
+    });
+  };
+  const std::vector<Estimate> within = estimates(WithinFrame, WithinFrames);
+  const std::vector<Estimate> frames = estimates(BetweenFrames, BetweenFrameCount);
+  const std::vector<Estimate> poses = estimates(BetweenPoses, BetweenPoseCount);
+  std::vector<PatternRow> rows;
+  for (std::size_t a = 0; a < within.size(); ++a)
+    rows.push_back(
+        {contrastSteps()[a].distance(), within[a], frames[a], poses[a], 0.0});
+  return rows;
+}
+
+std::vector<DistantRow>
+distantRowsOf(const std::vector<CellSums>& cells, const BlockCorrelogram& blocks)
+{
+  const std::vector<Estimate> means = jackknifeAll(cells, [](const auto& sums) {
+    return Eigen::ArrayXd(column(sums, BlockProducts) / column(sums, BlockPairs));
+  });
+  std::vector<DistantRow> rows;
+  for (std::size_t a = 0; a < means.size(); ++a)
+    rows.push_back({blocks.bin_distances[static_cast<Eigen::Index>(a)], means[a], 0.0});
+  return rows;
+}
+
+void
+requireSameSizes(const std::vector<PoseFrames>& poses)
+{
+  if (poses.empty())
+    throw std::invalid_argument("there is no pose");
+  for (const PoseFrames& pose : poses) {
+    if (pose.empty())
+      throw std::invalid_argument("a pose has no frame");
+    requireSameSizes(pose);
+    if (pose.front().width != poses.front().front().width ||
+        pose.front().height != poses.front().front().height)
+      throw std::invalid_argument("the frames differ in size");
+  }
+}
+
+} // namespace
+
+NoisePattern
+PatternCalibration::pattern() const
+{
+  NoisePattern pattern;
+  for (const WaveEstimate& wave : waves)
+    pattern.waves.push_back({wave.sigma.value, wave.length.value, wave.shape});
+  return pattern;
+}
+
+PatternCalibration
+calibratePattern(const std::vector<PoseFrames>& poses,
+                 const NoiseCalibrationOptions& options)
+{
+  if (const std::string error = validityError(options); !error.empty())
+    throw std::invalid_argument(error);
+  requireSameSizes(poses);
+  const Observed observed = observe(poses, options);
+  PatternCalibration result;
+  result.poses = static_cast<int>(poses.size());
+  result.status = observed.status;
+  result.pose = observed.pose;
+  if (result.status != NoiseCalibrationStatus::Ok)
+    return result;
+
+  const BlockCorrelogram blocks = observed.blocks.finish();
+  const std::vector<CellSums> cells =
+      joined(contrastSums(observed.images), blocks.cells);
+  result.rows = rowsOf(cells);
+  result.distant = distantRowsOf(cells, blocks);
+  Eigen::ArrayXd distances(kDifferences);
+  for (Eigen::Index a = 0; a < kDifferences; ++a)
+    distances[a] = distanceOf(a);
+  const PatternDesign design(distances, blocks);
+  PatternFit fit(cells, design);
+  constexpr auto kExponential = PatternShape::Exponential;
+  constexpr auto kGaussian = PatternShape::Gaussian;
+  fit.fit({{kExponential, kGaussian}, {kExponential, kExponential}});
+  if (!fit.hasOnlyWaves())
+    fit.fit({{kExponential}, {kGaussian}});
+  if (!fit.hasOnlyWaves())
+    fit.fit({{}});
+  fit.write(result);
+  return result;
+}
+
+} // namespace holdfast
