@@ -2,7 +2,7 @@
 // the whole.
 #include "console.h"
 #include "experiment.h"
-#include "recordings.h"
+#include "other_poses.h"
 
 #include <holdfast/geometry/constants.h>
 #include <holdfast/geometry/rotation.h>
@@ -354,14 +354,24 @@ explanations()
       "What the whole plane is bent or uneven counts as an error here."};
 }
 
+struct RealOptions {
+  RecordingOptions recordings;
+  bool leave_one_out = false;
+};
+
 Report
-run(const ExperimentSettings& settings, const RecordingOptions& options)
+run(const ExperimentSettings& settings, const RealOptions& options)
 {
   Report report;
   report.columns = columns();
   report.remarks = explanations();
-  const std::vector<Recording> recordings =
-      loadRecordings(options, settings.seed, report.remarks);
+  std::vector<Recording> recordings =
+      loadRecordings(options.recordings, settings.seed, report.remarks);
+  if (options.leave_one_out)
+    usePatternsOfOtherPoses(recordings, report.remarks);
+  else
+    report.remarks.push_back("Pattern of the sensor: " +
+                             patternText(recordings.front().sensor.pattern));
   const int total = static_cast<int>(recordings.size() * kSizes.size());
   Tallies all;
   int done = 0;
@@ -403,8 +413,14 @@ realExperiment()
           "At most so many discs of each size on each recording",
           1000,
           [](CLI::App& command) {
-            const auto options = std::make_shared<RecordingOptions>();
-            addRecordingOptions(command, *options);
+            const auto options = std::make_shared<RealOptions>();
+            addRecordingOptions(command, options->recordings);
+            command
+                .add_flag("--leave-one-out",
+                          options->leave_one_out,
+                          "Estimate the pattern of each recording from those of other "
+                          "poses, in place of the sensor's")
+                ->group("Input");
             return ExperimentRun([options](const ExperimentSettings& settings) {
               return run(settings, *options);
             });

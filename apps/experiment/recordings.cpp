@@ -86,6 +86,8 @@ loadRecording(const std::string& path,
   recording.sensor = matchedSensor(sensorOf(info, nominal), recording.cloud, &notice);
   if (!notice.empty())
     notices.push_back(notice);
+  if (!recording.cloud.covariances.empty())
+    notices.emplace_back("its own covariances count, and no pattern");
   for (const std::string& line : notices)
     remarks.push_back(recording.name + ": " + line);
   const auto plane = findLargestPlane(recording.cloud, recording.sensor, seed);
