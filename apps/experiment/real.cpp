@@ -296,6 +296,7 @@ panelOf(const std::vector<Json>& rows,
 {
   Panel panel;
   panel.title = title;
+  panel.x.label = "radius of the discs, and which of their pixels";
   panel.y = {label, logarithmic};
   for (const DiscSize& size : kSizes)
     panel.x.categories.push_back(sizeName(size.radius_px, size.stride_px));
