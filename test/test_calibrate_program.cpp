@@ -38,7 +38,8 @@ protected:
     return test::runProgram(folder_, arguments);
   }
 
-  /// Frames of a table as a Kinect sees it.
+  /// Frames of a table as a Kinect sees it, were its errors independent: a pattern
+  /// would be another in every frame.
   Names simulate(int frames) const
   {
     Names paths;
@@ -50,6 +51,7 @@ protected:
                                                "-o",
                                                paths.back(),
                                                "--quantize",
+                                               "--no-pattern",
                                                "--random-seed",
                                                std::to_string(i)});
       EXPECT_EQ(run.exit_code, 0) << run.err;

@@ -1,5 +1,10 @@
 // `holdfast experiment`: every experiment in a short form, its files and its JSON.
+#include "support/organized_cloud.h"
+#include "support/random.h"
 #include "support/run_program.h"
+
+#include <holdfast/io/cloud_io.h>
+#include <holdfast/io/config.h>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -8,7 +13,9 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace holdfast { namespace {
@@ -183,6 +190,109 @@ TEST_F(ExperimentProgram, PclIsBiasedWhereHoldfastIsNot)
       EXPECT_GT(std::abs(bias), error);
     }
   }
+}
+
+/// Frame of a tilted plane with independent errors of the disparity, as of an xtion.
+RangeCloud
+noisyPlane(test::Random& random)
+{
+  const Sensor sensor = loadSensor("xtion");
+  const double scale = sensor.baseline_m * sensor.disparity_focal_px;
+  return test::makeOrganizedCloud(sensor.camera, [&](int u, int v) {
+    const double disparity = scale / 1.1 + 0.01 * (u - 320) + 0.02 * (v - 240);
+    return scale / (disparity + 0.17 * random.normal());
+  });
+}
+
+TEST_F(ExperimentProgram, RealIsRightOnIndependentNoiseWithoutThePattern)
+{
+  test::Random random;
+  const std::string cloud = folder_ + "/plane.pcd";
+  saveCloud(cloud, noisyPlane(random));
+  const test::ProgramRun run = experiment(
+      {"real", "--clouds", cloud, "--trials", "400", "--seed", "5", "--json", "-"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(run.err, "");
+  const Json json = Json::parse(run.out);
+  ASSERT_EQ(json.at("rows").size(), 20u); // the recording and all, five sizes each
+  for (const Json& row : json.at("rows")) {
+    SCOPED_TRACE(row.dump());
+    EXPECT_EQ(row.at("failures"), 0);
+    EXPECT_TRUE(row.at("recording") == "plane" || row.at("recording") == "all");
+    const double nees = row.at("nees_per_dof");
+    if (row.at("pattern") == "with") {
+      EXPECT_LT(nees, 0.7); // more error than there is
+      continue;
+    }
+    // Four standard errors. Discs that half overlap count as half as many.
+    const double n = 0.5 * row.at("patches").get<double>();
+    EXPECT_NEAR(nees, 1.0, 4.0 * std::sqrt(2.0 / (3.0 * n)));
+    EXPECT_NEAR(row.at("coverage95"), 0.95, 4.0 * std::sqrt(0.95 * 0.05 / n));
+    EXPECT_LT(row.at("curved_share"), 0.01 + 4.0 * std::sqrt(0.01 / n));
+    EXPECT_NEAR(row.at("chi2_per_dof"), 1.0, 0.05);
+    EXPECT_EQ(row.at("chi2_per_dof"), row.at("chi2_per_expected"));
+  }
+}
+
+TEST_F(ExperimentProgram, RealFindsThePatternInRecordedTables)
+{
+  const std::string cloud = test::recordedCloud("mosd_static_learn17.pcd");
+  if (cloud.empty())
+    GTEST_SKIP() << "no recorded clouds: set HOLDFAST_DATA_DIR";
+  const test::ProgramRun run =
+      experiment({"real", "--clouds", cloud, "--trials", "300", "--json", "-"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  std::map<std::pair<int, int>, double> curved_without;
+  const Json json = Json::parse(run.out);
+  for (const Json& row : json.at("rows")) {
+    SCOPED_TRACE(row.dump());
+    EXPECT_EQ(row.at("failures"), 0);
+    const double nees = row.at("nees_per_dof"), curved = row.at("curved_share");
+    const int radius = row.at("radius_px"), stride = row.at("stride_px");
+    if (row.at("pattern") == "without") {
+      EXPECT_GT(nees, 4.0);
+      curved_without[{radius, stride}] = curved;
+      continue;
+    }
+    EXPECT_GT(nees, 0.5);
+    EXPECT_LT(nees, 1.7);
+    EXPECT_GT(row.at("coverage95").get<double>(), 0.85);
+    if (stride == 1)
+      EXPECT_LT(curved, 0.5 * curved_without.at({radius, stride}));
+  }
+}
+
+TEST_F(ExperimentProgram, RealWantsOrganizedCloudsWithAPlane)
+{
+  test::Random random;
+  RangeCloud cloud = noisyPlane(random);
+  auto points = pcl::make_shared<pcl::PointCloud<pcl::PointXYZ>>(*cloud.points);
+  for (std::size_t i = 0; i < points->size(); ++i)
+    if (i / 640 > 30) // too few rows are left
+      (*points)[i].getVector3fMap().setConstant(test::kNaN);
+  cloud.points = points;
+  saveCloud(folder_ + "/stripe.pcd", cloud);
+  points->width *= points->height;
+  points->height = 1;
+  saveCloud(folder_ + "/line.pcd", cloud);
+  const std::string empty = folder_ + "/empty";
+  std::filesystem::create_directory(empty);
+  const std::map<std::string, Names> causes{
+      {"no plane of 20000 pixels", {"--clouds", folder_ + "/stripe.pcd"}},
+      {"line.pcd: not organized", {"--clouds", folder_ + "/line.pcd"}},
+      {"empty: no recordings", {"--data", empty}}};
+  for (const auto& [cause, options] : causes) {
+    Names arguments{"real"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    const test::ProgramRun run = experiment(arguments);
+    EXPECT_EQ(run.exit_code, 1) << run.err;
+    EXPECT_EQ(run.errorLines(), 1) << run.err;
+    EXPECT_NE(run.err.find(cause), std::string::npos) << run.err;
+  }
+  for (const Names& arguments :
+       std::vector<Names>{{"real", "--clouds", folder_ + "/missing.pcd"},
+                          {"real", "--sensor", "nonsense"}})
+    EXPECT_EQ(experiment(arguments).exit_code, 2);
 }
 
 TEST_F(ExperimentProgram, WritesTableAndFiles)

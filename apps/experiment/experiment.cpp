@@ -30,7 +30,8 @@ experiments()
           figureFiveExperiment(),
           figureSixExperiment(),
           neighborhoodsExperiment(),
-          pclExperiment()};
+          pclExperiment(),
+          realExperiment()};
 }
 
 struct ExperimentArguments {

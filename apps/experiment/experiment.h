@@ -40,6 +40,7 @@ Experiment figureFiveExperiment();
 Experiment figureSixExperiment();
 Experiment neighborhoodsExperiment();
 Experiment pclExperiment();
+Experiment realExperiment();
 
 /// Adds --data DIR, the folder of recorded clouds (also from the environment variable
 /// HOLDFAST_DATA_DIR). `folder` must outlive the parsing.

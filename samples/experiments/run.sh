@@ -4,8 +4,8 @@
 #
 #   samples/experiments/run.sh HOLDFAST [RECORDINGS]
 #
-# HOLDFAST is the program; RECORDINGS a folder of recorded clouds, without which the
-# recorded half of figure6 is left as it is.
+# HOLDFAST is the program; RECORDINGS a folder of recorded clouds, without which `real`
+# and the recorded half of figure6 are left as they are.
 set -euo pipefail
 holdfast=$(realpath "$1")
 recordings=${2:+$(realpath "$2")}
@@ -35,4 +35,6 @@ run . neighborhoods --trials 5000 --seed 7
 if [[ -n $recordings ]]; then
   ln -s "$recordings" recordings
   run . figure6 --data recordings
+  # Are the covariances right on a real camera?
+  run . real --data recordings --seed 7
 fi

@@ -70,7 +70,7 @@ void attachNoise(RangeImage& image, const NoiseModel& noise, double noise_scale 
 /// the rays meet. Where a model leaves a pattern less room than it takes (khoshelham
 /// far from the optical axis, with hardly any white part), the covariance is that of
 /// the pattern and of what is left across it.
-/// 	hrow std::invalid_argument when there is a pattern and the rays do not lie on rows
+/// \throw std::invalid_argument when there is a pattern and the rays do not lie on rows
 /// and columns of the sensor's camera.
 void attachNoise(RangeImage& image, const Sensor& sensor, double noise_scale = 1.0);
 
