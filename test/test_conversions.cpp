@@ -32,7 +32,8 @@ randomExtracted(Random& random, PatchType type)
   for (Eigen::Index i = 0; i < m; ++i)
     for (Eigen::Index j = 0; j <= i; ++j)
       fit.state_covariance(i, j) = fit.state_covariance(j, i) = 1e-5 * random.normal();
-  fit.flags.curvature_not_observable = true;
+  // Of a cylinder it would leave entries out.
+  fit.flags.curvature_not_observable = type.surface == SurfaceType::Sphere;
   fit.nonlinearity = random.uniform(0.0, 0.1);
   fit.chi2 = random.uniform(50.0, 150.0);
   fit.chi2_dof = 94;

@@ -78,7 +78,7 @@ writeEverything(const std::string& name)
 
   const Sensor sensor = loadSensor("kinect_v1");
   EXPECT_GT(sensor.camera.fx, 100.0);
-  const NoiseParameters noise{{"sigma_disparity_px", 0.1234},
+  const NoiseParameters noise{{"sigma_disparity_px", 0.1834},
                               {"sigma_point_px", 0.5},
                               {"baseline_m", 0.075},
                               {"focal_px", 1575.8}};

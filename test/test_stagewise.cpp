@@ -282,6 +282,7 @@ optionSets()
     options.normal_from_pca = (bits & 2) != 0;
     options.smooth_circle_radius = (bits & 4) != 0;
     options.residual = (bits & 8) != 0 ? Residual::Ray : Residual::Sampson;
+    options.centre_on_normal_line = false; // the paper's chain ends at the apex
     sets.push_back(options);
   }
   return sets;

@@ -105,7 +105,7 @@ struct PatchConsensus::Impl {
 
   const SacSurface& surface;
   RangeCloud cloud;
-  NoiseModel::ConstPtr noise;
+  Sensor sensor; ///< of which the noise may be null
   ConsensusOptions options;
   // What depends on these; without noise there are no gatherers.
   std::string input_error;
@@ -124,11 +124,13 @@ PatchConsensus::Impl::prepare()
   distance_gatherer.reset();
   fit_gatherer.reset();
   input_error = validityError(cloud);
-  if (!input_error.empty() || (!noise && cloud.covariances.empty()))
+  if (!input_error.empty() || (!sensor.noise && cloud.covariances.empty()))
     return;
   // The model is not asked where there are covariances, but has to be there.
-  const NoiseModel::ConstPtr model = noise ? noise : isotropicNoise(0.0);
-  distance_gatherer = std::make_unique<const PointGatherer>(cloud, model, false);
+  Sensor model = sensor;
+  if (!model.noise)
+    model.noise = isotropicNoise(0.0);
+  distance_gatherer = std::make_unique<const PointGatherer>(cloud, model.noise, false);
   fit_gatherer =
       std::make_unique<const PointGatherer>(cloud, model, fit.noise_at_surface);
 }
@@ -290,9 +292,9 @@ PatchConsensus::setCloud(const RangeCloud& cloud)
 }
 
 void
-PatchConsensus::setNoiseModel(const NoiseModel::ConstPtr& noise)
+PatchConsensus::setSensor(const Sensor& sensor)
 {
-  impl_->noise = noise;
+  impl_->sensor = sensor;
   impl_->prepare();
 }
 

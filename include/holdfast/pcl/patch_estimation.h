@@ -64,10 +64,11 @@ public:
     return sensor_;
   }
 
-  /// The noise of the sensor alone.
+  /// The noise of the sensor alone; errors of the points are independent then.
   void setNoiseModel(const NoiseModel::ConstPtr& noise)
   {
     sensor_.noise = noise;
+    sensor_.pattern = {};
   }
 
   /// Covariances beside the cloud, one per point of the search surface (which is the

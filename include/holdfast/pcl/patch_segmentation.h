@@ -62,14 +62,16 @@ public:
     return covariances_;
   }
 
+  /// Errors of the points are independent then.
   void setNoiseModel(const NoiseModel::ConstPtr& noise)
   {
-    noise_ = noise;
+    sensor_ = {};
+    sensor_.noise = noise;
   }
 
   void setSensor(const Sensor& sensor)
   {
-    setNoiseModel(sensor.noise);
+    sensor_ = sensor;
   }
 
   /// See SampleConsensusModelPatch::setSensorPose().
@@ -168,7 +170,7 @@ private:
   void reportNotice(const std::string& notice);
 
   CovariancesConstPtr covariances_;
-  NoiseModel::ConstPtr noise_;
+  Sensor sensor_; ///< of which the noise may be null
   std::optional<Pose> sensor_pose_;
   ConsensusOptions options_;
   FitResult patch_;

@@ -94,12 +94,12 @@ public:
     return covariances_;
   }
 
+  /// Errors of the points are independent then.
   void setNoiseModel(const NoiseModel::ConstPtr& noise);
 
-  void setSensor(const Sensor& sensor)
-  {
-    setNoiseModel(sensor.noise);
-  }
+  /// The noise of a sensor; where it has a pattern, the covariance of the refined model
+  /// knows it.
+  void setSensor(const Sensor& sensor);
 
   /// Where the sensor stood, q_cloud = R q_camera + c, in place of what the cloud says
   /// (see toRangeCloud()); nothing: the cloud decides again.

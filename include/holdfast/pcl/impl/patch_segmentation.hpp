@@ -171,7 +171,7 @@ PatchSegmentation<PointT>::initSACModel(int model_type)
   model->setInputCovariances(covariances_);
   model->setSensorPose(sensor_pose_);
   // Last, since a model that looks at the whole image takes its time.
-  model->setNoiseModel(noise_);
+  model->setSensor(sensor_);
   const std::string error = misuse(*model);
   if (!error.empty()) {
     reportError(error);

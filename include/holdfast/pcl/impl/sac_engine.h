@@ -4,7 +4,7 @@
 
 #include <holdfast/pcl/consensus_options.h>
 #include <holdfast/pcl/range_cloud.h>
-#include <holdfast/sensor/noise_model.h>
+#include <holdfast/sensor/sensor.h>
 
 #include <pcl/types.h>
 
@@ -43,9 +43,11 @@ public:
   /// Covariances of the cloud go before the noise model.
   void setCloud(const RangeCloud& cloud);
 
-  /// null: nothing is known but that the noise of all points is the same in all
-  /// directions. Its size then comes from the distances of the inliers.
-  void setNoiseModel(const NoiseModel::ConstPtr& noise);
+  /// Distances go by the noise of single points, the covariance of the refined model by
+  /// the pattern as well. Without noise nothing is known but that the noise of all points
+  /// is the same in all directions. Its size then comes from the distances of the
+  /// inliers.
+  void setSensor(const Sensor& sensor);
 
   /// \throw std::invalid_argument when the options make no sense.
   void setOptions(const ConsensusOptions& options);

@@ -46,7 +46,16 @@ template <typename PointT>
 void
 SampleConsensusModelPatch<PointT>::setNoiseModel(const NoiseModel::ConstPtr& noise)
 {
-  engine_->setNoiseModel(noise);
+  Sensor sensor;
+  sensor.noise = noise;
+  setSensor(sensor);
+}
+
+template <typename PointT>
+void
+SampleConsensusModelPatch<PointT>::setSensor(const Sensor& sensor)
+{
+  engine_->setSensor(sensor);
   noticed_.reset();
 }
 
