@@ -47,6 +47,14 @@ addPatchOptions(CLI::App& command, ExtractionSettings& settings)
       ->type_name("PER_M")
       ->capture_default_str()
       ->group(group);
+  command
+      .add_option("--flat-within",
+                  fit.flat_within_m,
+                  "A surface that bends by less than this within its patch counts as a "
+                  "plane, metres; default: what the points can tell from one is none")
+      ->check(positiveNumber("M"))
+      ->type_name("")
+      ->group(group);
   addChoice(command,
             "--residual",
             fit.residual,
@@ -178,6 +186,8 @@ finishExtractionOptions(const CLI::App& command, ExtractionSettings& settings)
     paper.plane_boundary = fit.plane_boundary;
     if (command.count("--containment") > 0)
       paper.containment = fit.containment;
+    if (command.count("--flat-within") > 0)
+      paper.flat_within_m = fit.flat_within_m;
     if (command.count("--curvature-tolerance") > 0)
       paper.curvature_tolerance_per_m = fit.curvature_tolerance_per_m;
     fit = paper;

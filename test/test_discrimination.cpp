@@ -156,4 +156,24 @@ TEST(Discrimination, TypesAreRecognisedFromNoisyPoints)
   }
 }
 
+// A bowl whose curvature is beyond doubt, and rises by kappa d^2/2 within its bounds.
+TEST(FlatWithin, CountsWhatBendsByLessAsAPlane)
+{
+  Random random;
+  const PatchType type{SurfaceType::CircularParaboloid, BoundaryType::Circle};
+  PointBatch batch = test::batchOf(test::robotSample(type, 0.2, random));
+  const PatchFit curved = PatchFitter(FitOptions{}).fit(batch);
+  ASSERT_NE(curved.bounded.patch.type.surface, SurfaceType::Plane);
+  const double d = curved.bounded.patch.d[0];
+  const Eigen::Vector2d kappa = curved.bounded.patch.principalCurvatures();
+  const double sagitta = 0.5 * kappa.cwiseAbs().maxCoeff() * d * d;
+  const auto surfaceWithin = [&batch](double limit) {
+    FitOptions options;
+    options.flat_within_m = limit;
+    return PatchFitter(options).fit(batch).bounded.patch.type.surface;
+  };
+  EXPECT_EQ(surfaceWithin(0.5 * sagitta), curved.bounded.patch.type.surface);
+  EXPECT_EQ(surfaceWithin(2.0 * sagitta), SurfaceType::Plane);
+}
+
 }} // namespace holdfast

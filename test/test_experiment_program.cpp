@@ -257,8 +257,9 @@ TEST_F(ExperimentProgram, RealFindsThePatternInRecordedTables)
     EXPECT_GT(nees, 0.5);
     EXPECT_LT(nees, 1.7);
     EXPECT_GT(row.at("coverage95").get<double>(), 0.85);
-    if (stride == 1)
+    if (stride == 1) {
       EXPECT_LT(curved, 0.5 * curved_without.at({radius, stride}));
+    }
   }
 }
 

@@ -31,6 +31,16 @@ curvatureInRange(const SurfaceFit& fit, double limit)
                    [&](auto m) { return m.largestCurvature(fit.surface.k) <= limit; });
 }
 
+// True when the paraboloid rises by less than the limit at the bounds along the points'
+// longer axis: kappa d^2 / 2, d = lambda sqrt(moment).
+bool
+isFlatWithin(double limit, const PatchFit& fit, double lambda)
+{
+  const double curvature = models::Paraboloid::largestCurvature(fit.surface.surface.k);
+  const double squared_bound = lambda * lambda * fit.scatter.eigenvalues[2];
+  return 0.5 * curvature * squared_bound < limit;
+}
+
 SurfaceType
 signedType(const Eigen::Vector3d& k)
 {
@@ -67,6 +77,8 @@ PatchFitter::patchType(const PatchFit& fit) const
     return typed(signedType(surface.surface.k));
   const ThetaMatrix covariance =
       thetaCovariance(surface.linearization, surface.linearization.H);
+  if (isFlatWithin(options_.flat_within_m, fit, bound_settings_.factors.lambda))
+    return typed(SurfaceType::Plane);
   return typed(discriminate(surface.surface.k,
                             covariance.topLeftCorner<3, 3>(),
                             thresholds_,

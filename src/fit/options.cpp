@@ -43,6 +43,8 @@ validityError(const FitOptions& options)
     return "discrimination_level must lie between 0 and 1, both excluded";
   if (!(options.curvature_tolerance_per_m >= 0.0))
     return "curvature_tolerance_per_m must not be negative";
+  if (!(options.flat_within_m >= 0.0 && std::isfinite(options.flat_within_m)))
+    return "flat_within_m must not be negative";
   if (!positive(options.max_curvature_per_m))
     return "max_curvature_per_m must be a positive number";
   if (options.max_iterations < 1)

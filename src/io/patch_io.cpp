@@ -180,6 +180,7 @@ optionsJson(const PatchReport& report)
            fit.plane_boundary ? Json(boundaryName(*fit.plane_boundary)) : Json()},
           {"containment", fit.containment},
           {"curvature_tolerance", fit.curvature_tolerance_per_m},
+          {"flat_within", fit.flat_within_m},
           {"discrimination_level", fit.discrimination_level},
           {"residual", kResidualNames.of(fit.residual)},
           {"debias_scatter", fit.debias_scatter},

@@ -78,6 +78,10 @@ struct FitOptions {
   /// never told apart, however sure the data are, 1/m. A floor under the tests of stage
   /// I-3.
   double curvature_tolerance_per_m = 0.1;
+  /// A surface that rises by less than this over its tangent plane within the patch's
+  /// own extent counts as a plane, however sure its curvature is, m; 0: none does. For
+  /// those to whom a curvature that is significant but of no consequence is none.
+  double flat_within_m = 0.0;
   /// Test level of stage I-3: the probability of calling a true plane, circular or
   /// cylindric paraboloid something more complicated.
   double discrimination_level = 0.01;

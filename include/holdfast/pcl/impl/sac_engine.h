@@ -44,9 +44,9 @@ public:
   void setCloud(const RangeCloud& cloud);
 
   /// Distances go by the noise of single points, the covariance of the refined model by
-  /// the pattern as well. Without noise nothing is known but that the noise of all points
-  /// is the same in all directions. Its size then comes from the distances of the
-  /// inliers.
+  /// the pattern as well. Without noise nothing is known but that the noise of all
+  /// points is the same in all directions. Its size then comes from the distances of
+  /// the inliers.
   void setSensor(const Sensor& sensor);
 
   /// \throw std::invalid_argument when the options make no sense.
