@@ -35,6 +35,8 @@ run . neighborhoods --trials 5000 --seed 7
 if [[ -n $recordings ]]; then
   ln -s "$recordings" recordings
   run . figure6 --data recordings
-  # Are the covariances right on a real camera?
+  # Are the covariances right on a real camera? With the pattern of the sensor file, and
+  # with that of the other poses.
   run . real --data recordings --seed 7
+  run leave_one_out real --data recordings --seed 7 --leave-one-out
 fi
