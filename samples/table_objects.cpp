@@ -81,7 +81,7 @@ largestOfAll(Segmentation& segmentation, pcl::Indices& inliers)
        {pcl::SACMODEL_PLANE, pcl::SACMODEL_SPHERE, pcl::SACMODEL_CYLINDER}) {
     pcl::PointIndices on_surface;
     const holdfast::FitResult fit = largest(segmentation, kind, on_surface);
-    if (holdfast::isUsable(fit.status) && holdfast::chi2PerDof(fit) < 0.9 &&
+    if (holdfast::isUsable(fit.status) && fit.chi2 < 0.9 * fit.chi2_dof &&
         fit.points > 1.05 * best.points) {
       best = fit;
       inliers = on_surface.indices;

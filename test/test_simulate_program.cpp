@@ -140,7 +140,7 @@ TEST_F(SimulateProgram, TruthTellsThePatternThatWasDrawn)
     EXPECT_EQ(waves[i].at("length_px"), sensor.pattern.waves[i].length_px / 8);
   }
   EXPECT_EQ(waves[0].at("shape"), "exponential");
-  EXPECT_EQ(waves[1].at("shape"), "gaussian");
+  EXPECT_EQ(waves[1].at("shape"), "exponential");
 
   make("ball", {"--random-seed", "5", "--no-pattern"});
   EXPECT_EQ(truth().at("sensor").at("pattern"), Json::array());

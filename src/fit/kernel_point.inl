@@ -1095,26 +1095,25 @@ foldCells(const CellSums& cells,
     }
 }
 
-// Their covariance with each other.
+// Their covariance with each other: folded over the rows, then over the columns.
 inline void
 foldCovariance(const CellSums& cells,
                double row_sign,
                double column_sign,
                double folded[kQuarter][kQuarter])
 {
-  const auto& C = cells.covariance;
-  for (int a = 0; a < kQuarter; ++a)
-    for (int b = 0; b < kQuarter; ++b) {
-      const int row = a / kHalf, column = a % kHalf;
-      const int other_row = b / kHalf, other_column = b % kHalf;
-      const int down = row > other_row ? row - other_row : other_row - row;
-      const int across =
-          column > other_column ? column - other_column : other_column - column;
-      const int far_down = kCells - 1 - row - other_row;
-      const int far_across = kCells - 1 - column - other_column;
-      folded[a][b] =
-          C[down][across] + column_sign * C[down][far_across] +
-          row_sign * (C[far_down][across] + column_sign * C[far_down][far_across]);
+  for (int row = 0; row < kHalf; ++row)
+    for (int other_row = 0; other_row < kHalf; ++other_row) {
+      const double* near =
+          cells.covariance[row > other_row ? row - other_row : other_row - row];
+      const double* far = cells.covariance[kCells - 1 - row - other_row];
+      double C[kCells];
+      for (int across = 0; across < kCells; ++across)
+        C[across] = near[across] + row_sign * far[across];
+      for (int a = 0; a < kHalf; ++a)
+        for (int b = 0; b < kHalf; ++b)
+          folded[row * kHalf + a][other_row * kHalf + b] =
+              C[a > b ? a - b : b - a] + column_sign * C[kCells - 1 - a - b];
     }
 }
 

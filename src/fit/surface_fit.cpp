@@ -575,7 +575,7 @@ patternOfGradient(const Linearization& l)
 {
   Eigen::Matrix<double, kernel::kMaxTheta, kPatternTerms> J;
   J << ThetaMatrix::Identity(), l.A;
-  return J * l.pattern * J.transpose();
+  return J.lazyProduct(l.pattern).eval().lazyProduct(J.transpose());
 }
 
 ThetaMatrix

@@ -61,9 +61,9 @@ hessianOf(const SurfaceFit& fit, CovarianceMode mode)
 
 // -F_theta H^-1.
 ByTheta
-gain(const ByTheta& F_theta, const ThetaMatrix& H)
+gain(const ByTheta& F_theta, const ThetaMatrix& inverse)
 {
-  return -F_theta.lazyProduct(symmetricInverse(H));
+  return -F_theta.lazyProduct(inverse);
 }
 
 // Noise sums that the plane stage shares with the surface and the moments. The moments
@@ -128,7 +128,7 @@ planeStageTerms(const PatchFit& fit,
   const PlaneStageSums sums = planeStageSums(fit, batch, options);
   ByTheta F_plane = ByTheta::Zero(G.rows(), 6);
   F_plane.leftCols<3>() = F.middleCols<3>(JointLayout::kPlane);
-  const ByTheta Gp = gain(F_plane, hessianOf(fit.plane, mode));
+  const ByTheta Gp = gain(F_plane, symmetricInverse(hessianOf(fit.plane, mode)));
   const ParameterMatrix cross =
       Gp * (sums.with_surface * G.transpose() + sums.with_moments * M.transpose());
   return symmetrized(
@@ -151,8 +151,10 @@ patternTerms(const PatternMatrix& pattern, const ByTheta& G, const ByMoments& M)
 }
 
 // Of what has the Jacobian F to the joint variables.
+// \param inverse of the Hessian
 ParameterMatrix
 firstOrderCovariance(const PatchJacobian& F,
+                     const ThetaMatrix& inverse,
                      const PatchFit& fit,
                      const PointBatch& batch,
                      const FitOptions& options,
@@ -161,8 +163,7 @@ firstOrderCovariance(const PatchJacobian& F,
   const Linearization& l = fit.surface.linearization;
   // d(estimate)/dq_i = G X_i + M D_i. lazyProduct: for matrices this small Eigen's
   // blocked product costs several times the work.
-  const ByTheta G =
-      gain(F.middleCols<6>(JointLayout::kTheta), hessianOf(fit.surface, mode));
+  const ByTheta G = gain(F.middleCols<6>(JointLayout::kTheta), inverse);
   const ByMoments M = F.middleCols<9>(JointLayout::kMean) + G.lazyProduct(l.A);
   const ByTheta with_theta =
       G.lazyProduct(l.XX) + 2.0 * M.lazyProduct(l.XD.transpose());
@@ -432,12 +433,14 @@ patchCovariance(const PatchFit& fit,
   const FitOptions& options = fitter.options();
   if (mode == CovarianceMode::MonteCarlo)
     return monteCarlo(fit, batch, options);
-  result.state =
-      firstOrderCovariance(fit.bounded.state_jacobian, fit, batch, options, mode);
-  result.parameters =
-      mode == CovarianceMode::Stagewise ?
-          stagewiseCovariance(fit, batch, options) :
-          firstOrderCovariance(fit.bounded.jacobian, fit, batch, options, mode);
+  const ThetaMatrix inverse = symmetricInverse(hessianOf(fit.surface, mode));
+  const auto firstOrder = [&](const PatchJacobian& F) {
+    return firstOrderCovariance(F, inverse, fit, batch, options, mode);
+  };
+  result.state = firstOrder(fit.bounded.state_jacobian);
+  result.parameters = mode == CovarianceMode::Stagewise ?
+                          stagewiseCovariance(fit, batch, options) :
+                          firstOrder(fit.bounded.jacobian);
   if (mode == CovarianceMode::SecondOrder)
     addSecondOrder(fit, batch, fitter, result);
   return result;

@@ -6,6 +6,7 @@
 /// Trees are built, and neighbourhoods of fit_covariance and ceres_autodiff gathered,
 /// before the clock starts; whole_chain and pcl_normal include their search, and
 /// whole_chain its share of the frame's preparation (case frame_preparation).
+/// whole_chain_pattern is the same with errors that neighbouring pixels share.
 #include "ceres_paraboloid.h"
 #include "rough_cloud.h"
 
@@ -80,23 +81,30 @@ measure(benchmark::State& state,
   state.counters["us"] = elapsed / total;
 }
 
+/// The scene's sensor with the waves of a Kinect, a tenth as high as its noise is.
+Sensor
+patternedSensor()
+{
+  Sensor sensor = scene().sensor;
+  sensor.pattern.waves = {{0.0089, 2.1, PatternShape::Exponential},
+                          {0.0103, 79.0, PatternShape::Exponential}};
+  return sensor;
+}
+
 void
-wholeChain(benchmark::State& state, int points, int threads)
+wholeChain(benchmark::State& state, const Sensor& sensor, int points, int threads)
 {
   ExtractionOptions options;
   options.sampler = samplerOptions(Neighborhood::Disc, points);
   options.threads = threads;
-  const ExtractionResult once = extractPatches(scene().cloud, scene().sensor, options);
+  const ExtractionResult once = extractPatches(scene().cloud, sensor, options);
   std::size_t seeds = once.patches.size();
   for (const auto& rejected : once.rejected)
     seeds += static_cast<std::size_t>(rejected.second);
   measure(
       state,
       seeds,
-      [&] {
-        benchmark::DoNotOptimize(
-            extractPatches(scene().cloud, scene().sensor, options));
-      },
+      [&] { benchmark::DoNotOptimize(extractPatches(scene().cloud, sensor, options)); },
       threads == 1 ? Clock::Processor : Clock::Wall);
   state.counters["points"] = meanSize(scene(), options.sampler);
   state.counters["usable"] =
@@ -203,7 +211,10 @@ registerCases()
   };
   for (const int n : {100, 400}) {
     const std::string size = "/" + std::to_string(n);
-    add("whole_chain" + size, [n](benchmark::State& s) { wholeChain(s, n, 1); });
+    add("whole_chain" + size,
+        [n](benchmark::State& s) { wholeChain(s, scene().sensor, n, 1); });
+    add("whole_chain_pattern" + size,
+        [n](benchmark::State& s) { wholeChain(s, patternedSensor(), n, 1); });
     for (const CovarianceMode mode : kAllCovarianceModes)
       if (mode != CovarianceMode::MonteCarlo)
         add("fit_" + std::string(covarianceModeName(mode)) + size,
@@ -219,7 +230,8 @@ registerCases()
     add("ceres_autodiff" + size, [n](benchmark::State& s) { ceresAutodiff(s, n); });
 #endif
   }
-  add("whole_chain_threads/2", [](benchmark::State& s) { wholeChain(s, 100, 2); });
+  add("whole_chain_threads/2",
+      [](benchmark::State& s) { wholeChain(s, scene().sensor, 100, 2); });
   add("frame_preparation", framePreparation);
 }
 
