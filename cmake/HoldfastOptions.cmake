@@ -35,10 +35,13 @@ if(HOLDFAST_SANITIZE)
   add_compile_definitions(EIGEN_MALLOC_ALREADY_ALIGNED=1)
 endif()
 
-# Warnings of one of our own targets.
+# Warnings of one of our own targets. PCL's macros for members of point types are
+# anonymous structs, which clang reports where they are used.
 function(holdfast_set_warnings target)
   target_compile_options(${target} PRIVATE
     -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
+    $<$<CXX_COMPILER_ID:Clang,AppleClang>:-Wno-gnu-anonymous-struct>
+    $<$<CXX_COMPILER_ID:Clang,AppleClang>:-Wno-nested-anon-types>
     $<$<BOOL:${HOLDFAST_WERROR}>:-Werror>)
 endfunction()
 

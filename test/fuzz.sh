@@ -46,6 +46,8 @@ fuzz() {
   local what=$1 end=$((SECONDS + $2)) seeds=$root/test/fuzz/corpus/$1
   local learned=$folder/corpus/$what findings=$folder/findings/$what log
   local executions=0 coverage="" runs=0 found=()
+  # Those of the last time are among the seeds.
+  rm -rf "$findings" "$folder/fuzz_$what".*.log
   mkdir -p "$learned" "$findings"
   while ((end > SECONDS && runs++ < 20)); do
     log=$folder/fuzz_$what.$runs.log

@@ -320,6 +320,13 @@ TEST(CloudIo, ErrorsNameTheCause)
                         1,
                         "ascii"),
         "COUNT 7, not 6"}},
+      {"far.pcd",
+       {test::pcdHeader(test::kXyzFields + "VIEWPOINT -1.5e308 0 0 1 0 0 0\n",
+                        1,
+                        1,
+                        "ascii") +
+            "1.5e308 2 3\n",
+        "viewpoint must be finite"}},
       {"data.pcd", {test::pcdHeader(test::kXyzFields, 1, 1, "base64"), "DATA"}},
       {"no_xyz.ply",
        {"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n",

@@ -217,7 +217,7 @@ TEST(PatchIo, FileNamesThatAreNoUtf8)
 {
   PatchReport report;
   report.cloud = "\xff\xfe.pcd";
-  EXPECT_NO_THROW(nlohmann::json::parse(jsonText(report, JsonLayout::OneLine)));
+  EXPECT_TRUE(nlohmann::json::accept(jsonText(report, JsonLayout::OneLine)));
 }
 
 TEST(PatchIo, ForeignJsonIsAnError)
@@ -228,6 +228,25 @@ TEST(PatchIo, ForeignJsonIsAnError)
   std::string text = jsonText(someReport(), JsonLayout::OneLine);
   text.replace(text.find("\"converged\""), 11, "\"confused!\"");
   EXPECT_THROW(readJson(text), std::runtime_error);
+}
+
+TEST(PatchIo, CountsThatAreNoneAreAnError)
+{
+  const auto json = nlohmann::json::parse(jsonText(someReport(), JsonLayout::OneLine));
+  const auto expectError = [&](const std::string& path, const std::string& name) {
+    // As double or modulo 2^32 most of them would be some int.
+    for (const char* count : {"1.5", "1e300", "2147483648", "-2147483649", "\"3\""}) {
+      auto changed = json;
+      changed[nlohmann::json::json_pointer(path)][name] = nlohmann::json::parse(count);
+      SCOPED_TRACE(path + ' ' + name + ": " + count);
+      EXPECT_THROW(readJson(changed.dump()), std::runtime_error);
+    }
+  };
+  for (const char* name : {"points", "uninformative_points", "chi2_dof", "iterations"})
+    expectError("/patches/0", name);
+  expectError("/patches/0/seed", "index");
+  for (const auto& [name, count] : json.at("rejected").items())
+    expectError("/rejected", name);
 }
 
 /// Vertex and face counts announced by a PLY header.

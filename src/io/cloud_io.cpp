@@ -348,6 +348,9 @@ finish(io::RawCloud& raw, const LoadOptions& options)
   if (countValidPoints(cloud) == 0)
     throw std::runtime_error("has no valid point");
   cloud.sensor_pose = sensorPoseOf(raw, options);
+  // In other units, or seen from points far on the other side, 1e308 is infinite.
+  if (const std::string error = validityError(cloud); !error.empty())
+    throw std::runtime_error(error);
   // Nobody has to say the identity.
   cloud.sensor_pose_given = options.sensor_pose || options.viewpoint || options.axes ||
                             !isIdentity(cloud.sensor_pose);

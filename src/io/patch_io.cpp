@@ -18,7 +18,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
+#include <limits>
 #include <sstream>
 #include <stdexcept>
 
@@ -290,10 +292,22 @@ known(const std::optional<Enum>& value, const std::string& name)
   return *value;
 }
 
+/// A member that is an int. Json itself would make one of any number, 1e300 and 5e9.
+int
+wholeNumber(const Json& json, const std::string& name)
+{
+  const Json& value = json.at(name);
+  constexpr double kLargest = std::numeric_limits<int>::max();
+  if (!value.is_number_integer() || std::abs(value.get<double>()) > kLargest)
+    throw std::runtime_error(Json(name).dump() + " is not a whole number");
+  return value.get<int>();
+}
+
 void
 readRejected(const Json& json, ExtractionResult& result)
 {
-  for (const auto& [name, count] : json.items()) {
+  for (const auto& [name, ignored] : json.items()) {
+    const int count = wholeNumber(json, name);
     if (const auto status = kStatusNames.find(name))
       result.rejected[*status] = count;
     else
@@ -382,16 +396,17 @@ patchFromJson(const Json& json, double containment)
   readNumbers(json, fit);
   const std::string status = json.at("status");
   fit.status = known(kStatusNames.find(status), status);
-  fit.points = json.at("points");
-  fit.uninformative_points = json.value("uninformative_points", 0); // not in old files
+  fit.points = wholeNumber(json, "points");
+  if (json.contains("uninformative_points")) // not in old files
+    fit.uninformative_points = wholeNumber(json, "uninformative_points");
   fit.chi2 = number(json.at("chi2"));
-  fit.chi2_dof = json.at("chi2_dof");
+  fit.chi2_dof = wholeNumber(json, "chi2_dof");
   // Not in files of former versions, which knew independent errors only.
   fit.chi2_expected = json.value("chi2_expected", static_cast<double>(fit.chi2_dof));
-  fit.iterations = json.at("iterations");
+  fit.iterations = wholeNumber(json, "iterations");
   readState(json, containment, fit);
   if (const Json& seed = json.at("seed"); !seed.is_null()) {
-    extracted.seed_index = seed.at("index").get<int>();
+    extracted.seed_index = wholeNumber(seed, "index");
     for (Eigen::Index i = 0; i < 3; ++i)
       extracted.seed(i) = number(seed.at("point").at(static_cast<std::size_t>(i)));
   }
