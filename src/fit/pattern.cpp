@@ -202,9 +202,12 @@ PatternSupport::sum(const PointBatch& batch,
 int
 PatternSupport::cellOf(double u, double v) const
 {
-  const int across = static_cast<int>((u - u0_) / side_px_);
-  const int down = static_cast<int>((v - v0_) / side_px_);
-  return down * kCells + across;
+  // Written so that pixels beyond all reason are in some cell, too.
+  const auto cell = [this](double distance) {
+    const double cells = distance / side_px_;
+    return cells > 0.0 ? static_cast<int>(std::min(cells, kCells - 1.0)) : 0;
+  };
+  return cell(v - v0_) * kCells + cell(u - u0_);
 }
 
 void
