@@ -551,6 +551,9 @@ readJson(const std::string& text)
     report.cloud = json.at("cloud");
     const double containment =
         json.at("options").value("containment", FitOptions{}.containment);
+    if (!(containment > 0.0 && containment < 1.0))
+      throw std::runtime_error("no result of holdfast: containment must lie between 0 "
+                               "and 1");
     // Files of earlier versions have none.
     if (const auto offset = json.find("offset"); offset != json.end())
       for (std::size_t i = 0; i < 3; ++i)
