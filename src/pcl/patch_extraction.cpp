@@ -286,13 +286,6 @@ noteLimit(std::size_t tried, std::size_t seeds, std::vector<std::string>& notice
 
 } // namespace
 
-bool
-isAccepted(const ExtractedPatch& patch)
-{
-  return isUsable(patch.fit.status) &&
-         (!patch.validation || patch.validation->verdict == PatchVerdict::Accepted);
-}
-
 std::vector<ExtractedPatch>
 acceptedAmong(std::vector<ExtractedPatch> attempts)
 {
