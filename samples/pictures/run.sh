@@ -1,9 +1,11 @@
 #!/usr/bin/env bash
 # Makes every picture of this folder anew, in seconds.
 #
-#   samples/pictures/run.sh HOLDFAST     the program
+#   samples/pictures/run.sh HOLDFAST [mosd_cyl_learn44.pcd]     the program, and for the
+#                                                               table its recording
 set -euo pipefail
 holdfast=$(realpath "$1")
+recording=${2:+$(realpath "$2")}
 here=$(dirname "$(realpath "${BASH_SOURCE[0]}")")
 
 work=$(mktemp -d)
@@ -16,3 +18,10 @@ cd "$work"
 "$holdfast" render rocks.patches.json -o "$here/rocks.png" --size 800x590
 "$holdfast" render rocks.patches.json -o "$here/rocks_sigma.png" --size 800x610 \
   --color sigma-normal
+
+[[ -n $recording ]] || exit 0
+for kind in "" _independent; do
+  "$holdfast" fit "$recording" --sensor xtion ${kind:+--no-pattern} -o . --quiet
+  "$holdfast" render "$(basename "$recording" .pcd).patches.json" \
+    -o "$here/table$kind.png" --size 800x600
+done
