@@ -13,6 +13,7 @@ endif()
 
 set(quickstart_without
   src/simulation/ src/evaluation/ src/sensor/noise_calibration
+  src/sensor/pattern_calibration
   src/uncertainty/stagewise src/uncertainty/second_order
   src/pcl/point_types src/pcl/patch_estimation_types src/pcl/range_covariance
   src/pcl/sac_ src/pcl/patch_segmentation src/pcl/transforms src/pcl/frame_extraction
