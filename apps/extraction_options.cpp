@@ -12,11 +12,10 @@
 namespace holdfast::app {
 namespace {
 
+/// What a patch may be, and what decides it.
 void
-addPatchOptions(CLI::App& command, ExtractionSettings& settings)
+addTypeOptions(CLI::App& command, FitOptions& fit, const std::string& group)
 {
-  const std::string group = "Patches";
-  FitOptions& fit = settings.options.fit;
   addChoice(command,
             "--surface",
             fit.surface,
@@ -55,6 +54,14 @@ addPatchOptions(CLI::App& command, ExtractionSettings& settings)
       ->check(positiveNumber("M"))
       ->type_name("")
       ->group(group);
+}
+
+void
+addPatchOptions(CLI::App& command, ExtractionSettings& settings)
+{
+  const std::string group = "Patches";
+  FitOptions& fit = settings.options.fit;
+  addTypeOptions(command, fit, group);
   addChoice(command,
             "--residual",
             fit.residual,

@@ -207,7 +207,7 @@ addNoPatternOption(CLI::App& command, bool& no_pattern)
                 no_pattern,
                 "Take the errors of neighbouring pixels as independent, whatever the "
                 "sensor file says: as the paper does, and on a real camera too sure by "
-                "a factor of 3 to 20")
+                "a factor of 3 to 12")
       ->group("Input");
 }
 

@@ -1,6 +1,7 @@
 #include <holdfast/sensor/noise_calibration.h>
 #include <holdfast/simulation/simulator.h>
 
+#include "support/disparity_image.h"
 #include "support/random.h"
 #include "support/tally.h"
 
@@ -15,9 +16,9 @@
 
 namespace holdfast { namespace {
 
-using test::Tally;
+using test::imageOf, test::kFocalTimesBaseline;
 
-constexpr double kFocalTimesBaseline = 580.0 * 0.075; // px m
+using test::Tally;
 
 NoiseCalibrationOptions
 optionsFor(const Camera& camera)
@@ -52,19 +53,6 @@ smoothField(int width, int height, int reach, double sigma, test::Random& random
   for (double& value : white)
     value = sigma * random.normal();
   return along(along(white, width, 1, reach), height, width, reach);
-}
-
-/// A point image from a disparity of each pixel, on the ray grid.
-PointImage
-imageOf(const Camera& camera, const std::function<double(int u, int v)>& disparity)
-{
-  PointImage image{camera.width, camera.height, {}};
-  for (int v = 0; v < camera.height; ++v)
-    for (int u = 0; u < camera.width; ++u)
-      image.points.push_back(
-          camera.backProject(u, v, kFocalTimesBaseline / disparity(u, v))
-              .cast<float>());
-  return image;
 }
 
 Camera

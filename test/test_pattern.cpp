@@ -1,4 +1,5 @@
 // Errors that points share: the sums over cells against those over all pairs.
+#include "support/kinect_pattern.h"
 #include "support/patch_batch.h"
 #include "support/random.h"
 
@@ -16,14 +17,7 @@
 
 namespace holdfast { namespace {
 
-using test::Random;
-
-NoisePattern
-kinectPattern()
-{
-  return {
-      {{0.101, 1.6, PatternShape::Exponential}, {0.089, 56.0, PatternShape::Gaussian}}};
-}
+using test::kinectPattern, test::Random;
 
 constexpr double kFocal = 525.0;
 

@@ -1,6 +1,7 @@
 #include <holdfast/sensor/pattern_calibration.h>
 
 #include "support/correlated_field.h"
+#include "support/disparity_image.h"
 #include "support/random.h"
 #include "support/tally.h"
 
@@ -13,9 +14,10 @@
 
 namespace holdfast { namespace {
 
+using test::imageOf, test::kFocalTimesBaseline;
+
 using test::Tally;
 
-constexpr double kFocalTimesBaseline = 580.0 * 0.075; // px m
 constexpr double kWhite = 0.05; // px
 
 NoiseCalibrationOptions
@@ -24,18 +26,6 @@ optionsFor(const Camera& camera)
   NoiseCalibrationOptions options;
   options.camera = camera;
   return options;
-}
-
-PointImage
-imageOf(const Camera& camera, const std::function<double(int u, int v)>& disparity)
-{
-  PointImage image{camera.width, camera.height, {}};
-  for (int v = 0; v < camera.height; ++v)
-    for (int u = 0; u < camera.width; ++u)
-      image.points.push_back(
-          camera.backProject(u, v, kFocalTimesBaseline / disparity(u, v))
-              .cast<float>());
-  return image;
 }
 
 /// Frames of a plane, tilted at random, between 0.6 and 2.2 m, with a pattern that

@@ -1,4 +1,5 @@
 // Patches of whole simulated clouds whose pixels share errors, about the true surface.
+#include "support/kinect_pattern.h"
 #include "support/organized_cloud.h"
 #include "support/random.h"
 
@@ -19,8 +20,7 @@ Sensor
 kinectWithPattern()
 {
   Sensor sensor = test::makeSensor(test::makeCamera(640, 480, 575.8));
-  sensor.pattern.waves = {{0.101, 1.6, PatternShape::Exponential},
-                          {0.089, 56.0, PatternShape::Gaussian}};
+  sensor.pattern = test::kinectPattern();
   return sensor;
 }
 

@@ -3,6 +3,7 @@
 #include <holdfast/sensor/stereo_noise_model.h>
 #include <holdfast/simulation/simulator.h>
 
+#include "support/kinect_pattern.h"
 #include "support/random.h"
 
 #include <algorithm>
@@ -13,14 +14,7 @@
 
 namespace holdfast { namespace {
 
-using test::Random;
-
-NoisePattern
-kinectPattern()
-{
-  return {
-      {{0.101, 1.6, PatternShape::Exponential}, {0.089, 56.0, PatternShape::Gaussian}}};
-}
+using test::kinectPattern, test::Random;
 
 // Seven Gaussian waves are within a hundredth of an exponential one.
 double

@@ -6,6 +6,7 @@
 #include "pattern_report.h"
 
 #include <holdfast/io/config.h>
+#include <holdfast/pcl/conversions.h>
 #include <holdfast/sensor/stereo_noise_model.h>
 
 #include <algorithm>
@@ -18,20 +19,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 using Table = std::vector<std::vector<std::string>>;
-
-PointImage
-cameraFrame(const RangeCloud& cloud)
-{
-  PointImage image;
-  image.width = static_cast<int>(cloud.points->width);
-  image.height = static_cast<int>(cloud.points->height);
-  image.points.reserve(cloud.points->size());
-  for (const pcl::PointXYZ& point : *cloud.points) {
-    const Eigen::Vector3d q = point.getVector3fMap().cast<double>();
-    image.points.push_back(cloud.sensor_pose.toLocal(q).cast<float>());
-  }
-  return image;
-}
 
 double
 focalTimesBaseline(const Sensor& sensor)
@@ -387,7 +374,7 @@ measureNoise(const std::vector<std::vector<RangeCloud>>& poses,
   for (const std::vector<RangeCloud>& pose : poses) {
     PoseFrames& frames = images.emplace_back();
     for (const RangeCloud& cloud : pose)
-      frames.push_back(cameraFrame(cloud));
+      frames.push_back(toPointImage(cloud));
   }
   const PoseFrames& frames = images.front();
   NoiseCalibrationOptions options;

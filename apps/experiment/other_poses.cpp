@@ -2,6 +2,7 @@
 
 #include "console.h"
 
+#include <holdfast/pcl/conversions.h>
 #include <holdfast/sensor/names.h>
 #include <holdfast/sensor/pattern_calibration.h>
 
@@ -57,20 +58,6 @@ isSamePose(const Recording& a, const Recording& b)
   return overlap;
 }
 
-PointImage
-cameraFrame(const RangeCloud& cloud)
-{
-  PointImage image;
-  image.width = static_cast<int>(cloud.points->width);
-  image.height = static_cast<int>(cloud.points->height);
-  image.points.reserve(cloud.points->size());
-  for (const pcl::PointXYZ& point : *cloud.points) {
-    const Eigen::Vector3d q = point.getVector3fMap().cast<double>();
-    image.points.push_back(cloud.sensor_pose.toLocal(q).cast<float>());
-  }
-  return image;
-}
-
 /// From the recordings of all poses but one.
 NoisePattern
 patternWithout(int pose,
@@ -84,7 +71,7 @@ patternWithout(int pose,
     PoseFrames& of_other = frames.emplace_back();
     for (std::size_t i = 0; i < recordings.size(); ++i)
       if (poses[i] == other)
-        of_other.push_back(cameraFrame(recordings[i].cloud));
+        of_other.push_back(toPointImage(recordings[i].cloud));
   }
   const Sensor& sensor = recordings.front().sensor;
   NoiseCalibrationOptions options;

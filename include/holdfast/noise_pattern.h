@@ -5,7 +5,7 @@
 ///
 ///     C(D) = sum_m sigma_m^2 rho(D / length_m),    D the distance in pixels.
 ///
-/// On recorded Kinect tables s makes the error of a patch 3 to 20 times what white
+/// On recorded Kinect tables s makes the error of a patch 3 to 12 times what white
 /// noise of the same variance would; no residual inside the patch shows it.
 #pragma once
 

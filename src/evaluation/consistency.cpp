@@ -137,6 +137,20 @@ mahalanobis(const ParameterVector& x, const ParameterMatrix& S)
   return result;
 }
 
+// Squared error over the rank of its covariance, and whether the 95 % ellipsoid has it.
+struct Normalized {
+  double nees_per_dof = 0.0;
+  bool within = false;
+};
+
+Normalized
+normalized(const ParameterVector& error, const ParameterMatrix& covariance)
+{
+  const Mahalanobis m = mahalanobis(error, covariance);
+  const boost::math::chi_squared chi2(m.rank);
+  return {m.squared / m.rank, m.squared <= boost::math::quantile(chi2, 0.95)};
+}
+
 class TrialRunner {
 public:
   TrialRunner(const TruePoints& truth,
@@ -279,34 +293,18 @@ summarize(const std::vector<Trial>& trials, ConsistencyResult& result)
     if (trial.outcome != Trial::Outcome::Used)
       continue;
     variance += (trial.error - mean).cwiseAbs2();
-    const Mahalanobis about_fit =
-        mahalanobis(trial.error + trial.shift, trial.covariance);
+    const Normalized about_fit =
+        normalized(trial.error + trial.shift, trial.covariance);
     const Mahalanobis about_mean = mahalanobis(trial.error - mean, trial.covariance);
-    result.nees_per_dof += about_fit.squared / about_fit.rank / used;
+    result.nees_per_dof += about_fit.nees_per_dof / used;
     result.nees_per_dof_about_mean += about_mean.squared / about_mean.rank / used;
-    const boost::math::chi_squared chi2(about_fit.rank);
-    const bool within = about_fit.squared <= boost::math::quantile(chi2, 0.95);
-    result.coverage95 += static_cast<double>(within) / used;
+    result.coverage95 += static_cast<double>(about_fit.within) / used;
   }
   variance /= used - 1;
   const ParameterVector sigma = variance.cwiseSqrt();
   result.sigma_ratio = toStd(predicted.cwiseSqrt().cwiseQuotient(sigma));
   result.bias_sigma = toStd(mean.cwiseQuotient(sigma));
   result.bias_after_shift_sigma = result.bias_sigma;
-}
-
-// Squared error over the rank of its covariance, and whether the 95 % ellipsoid has it.
-struct Normalized {
-  double nees_per_dof = 0.0;
-  bool within = false;
-};
-
-Normalized
-normalized(const ParameterVector& error, const ParameterMatrix& covariance)
-{
-  const Mahalanobis m = mahalanobis(error, covariance);
-  const boost::math::chi_squared chi2(m.rank);
-  return {m.squared / m.rank, m.squared <= boost::math::quantile(chi2, 0.95)};
 }
 
 // A running mean.
@@ -342,13 +340,13 @@ summarizeStates(const std::vector<Trial>& trials,
 {
   for (const double edge : kColumnEdges)
     result.by_nonlinearity.push_back({edge, 0, 0.0, 0.0, 0.0});
+  const StateMatrix T = freeCoordinates(type);
   std::array<int, kColumnEdges.size()> with_parameters{};
   int usable = 0, unflagged = 0;
   for (const Trial& trial : trials) {
     if (trial.outcome == Trial::Outcome::Failed)
       continue;
     ++usable;
-    const StateMatrix T = freeCoordinates(type);
     const Normalized state =
         normalized(T * trial.state_error, T * trial.state_covariance * T.transpose());
     average(result.state_nees_per_dof, state.nees_per_dof, usable);

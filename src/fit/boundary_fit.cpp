@@ -113,20 +113,17 @@ orientRevolute(const Eigen::Vector2d& r_xy, Placement& p)
   return dr;
 }
 
-// The curvature matrix in the axes of the final frame, with its rows.
-struct CurvatureMap {
+// A symmetric matrix in the tangent plane, curvatures or moments, with its rows.
+struct PlaneMatrix {
   double xx = 0.0, xy = 0.0, yy = 0.0;
   Row dxx = Row::Zero(), dxy = Row::Zero(), dyy = Row::Zero();
 };
 
-CurvatureMap
+PlaneMatrix
 curvatureMap(const Eigen::Vector3d& k, const Eigen::Matrix3d& W)
 {
-  CurvatureMap map;
-  Eigen::Matrix3d T; // (xx, xy, yy) in the new axes from the old
-  const double a = W(0, 0), b = W(0, 1), c = W(1, 0), d = W(1, 1);
-  T << a * a, 2.0 * a * b, b * b, a * c, a * d + b * c, b * d, c * c, 2.0 * c * d,
-      d * d;
+  PlaneMatrix map;
+  const Eigen::Matrix3d T = symmetric::planeTurn(W.topLeftCorner<2, 2>());
   const Eigen::Vector3d turned = T * k;
   map.xx = turned[0], map.xy = turned[1], map.yy = turned[2];
   map.dxx.head<3>() = T.row(0);
@@ -278,7 +275,7 @@ boundTwoCurvatures(const BoundRequest& request,
   PatchWriter writer(request.type, out);
   const UnboundedSurface& surface = request.surface;
   const SurfaceType type = request.type.surface;
-  CurvatureMap K;
+  PlaneMatrix K;
   MomentFrame f = turnedFrame(request,
                               placed,
                               principalCurvatureAxes(surface),
@@ -462,10 +459,10 @@ boundPlaced(const BoundRequest& request,
 }
 
 // The curvature matrix in the axes of the placement, with its rows.
-CurvatureMap
+PlaneMatrix
 placedCurvature(const UnboundedSurface& surface)
 {
-  CurvatureMap map;
+  PlaneMatrix map;
   const Eigen::Matrix3d shares =
       withModel(surface.model, [](auto m) { return m.curvatureMatrix(); });
   const Eigen::Vector3d entries = shares * surface.k;
@@ -478,7 +475,7 @@ placedCurvature(const UnboundedSurface& surface)
 
 // K as a frame sees it that does not share the twist of the surface about its normal.
 void
-untwist(CurvatureMap& K, const Row& twist)
+untwist(PlaneMatrix& K, const Row& twist)
 {
   K.dxx -= 2.0 * K.xy * twist;
   K.dyy += 2.0 * K.xy * twist;
@@ -487,27 +484,20 @@ untwist(CurvatureMap& K, const Row& twist)
 
 // A symmetric matrix and its rows in axes turned by V, from the old to the new: about
 // the normal, or a matrix that is the same in all axes.
-CurvatureMap
-turnedMap(const CurvatureMap& map, const Eigen::Matrix3d& V_and_tilt)
+PlaneMatrix
+turnedMap(const PlaneMatrix& map, const Eigen::Matrix3d& V)
 {
-  const Eigen::Matrix3d V =
-      expMap({0.0, 0.0, -std::atan2(V_and_tilt(0, 1), V_and_tilt(0, 0))});
-  const Eigen::Vector3d entries(map.xx, map.xy, map.yy);
-  CurvatureMap turned = curvatureMap(entries, V);
+  const Eigen::Matrix3d T = symmetric::planeTurn(std::atan2(V(0, 1), V(0, 0)));
+  const Eigen::Vector3d entries = T * Eigen::Vector3d(map.xx, map.xy, map.yy);
   Rows3 rows;
   rows << map.dxx, map.dxy, map.dyy;
-  Eigen::Matrix3d T;
-  T << turned.dxx.head<3>(), turned.dxy.head<3>(), turned.dyy.head<3>();
-  const Rows3 turned_rows = T * rows;
-  turned.dxx = turned_rows.row(0);
-  turned.dxy = turned_rows.row(1);
-  turned.dyy = turned_rows.row(2);
-  return turned;
+  rows = (T * rows).eval();
+  return {entries[0], entries[1], entries[2], rows.row(0), rows.row(1), rows.row(2)};
 }
 
 // Group of a state: one mean, or all three entries.
 void
-writeGroup(int at, int count, const CurvatureMap& map, PatchJacobian& jacobian)
+writeGroup(int at, int count, const PlaneMatrix& map, PatchJacobian& jacobian)
 {
   if (count == 1) {
     jacobian.row(at) = 0.5 * (map.dxx + map.dyy);
@@ -520,11 +510,11 @@ writeGroup(int at, int count, const CurvatureMap& map, PatchJacobian& jacobian)
 }
 
 // Second moments about the centre of the patch.
-CurvatureMap
+PlaneMatrix
 momentsAboutCentre(const MomentFrame& f)
 {
   const double x = f.mean.x(), y = f.mean.y();
-  CurvatureMap m;
+  PlaneMatrix m;
   m.xx = f.M(0, 0) + x * x, m.xy = f.M(0, 1) + x * y, m.yy = f.M(1, 1) + y * y;
   m.dxx = f.dxx + 2.0 * x * f.dmean.row(0);
   m.dyy = f.dyy + 2.0 * y * f.dmean.row(1);
@@ -535,11 +525,11 @@ momentsAboutCentre(const MomentFrame& f)
 // The paper's radius of round bounds is that of the larger moment (smooth: the mean of
 // both); so is the state's then, in the axes of the bound.
 void
-keepLarger(const BoundedPatch& bounded, double factor, int row, CurvatureMap& m)
+keepLarger(const BoundedPatch& bounded, double factor, PlaneMatrix& m)
 {
   const double d = bounded.patch.d[0];
   m.xx = m.yy = d * d / (factor * factor);
-  m.dxx = m.dyy = 2.0 * d / (factor * factor) * bounded.jacobian.row(row);
+  m.dxx = m.dyy = 2.0 * d / (factor * factor) * bounded.jacobian.row(0);
 }
 
 // The state, about the centre of the bounded patch. Its frame turns with the normal and
@@ -560,16 +550,15 @@ writeState(const BoundRequest& request,
   Placement p{frame, out.patch.c - request.origin, placed.z};
   p.delta = W * placed.delta;
   p.gamma = frame.transpose() * out.jacobian.middleRows<3>(c);
-  CurvatureMap K = placedCurvature(request.surface);
+  PlaneMatrix K = placedCurvature(request.surface);
   untwist(K, p.delta.row(2));
   p.delta.row(2).setZero();
   K = turnedMap(K, frame.transpose() * placed.R);
-  CurvatureMap m = momentsAboutCentre(measureMoments(p, request.scatter, W));
+  PlaneMatrix m = momentsAboutCentre(measureMoments(p, request.scatter, W));
   const bool flat = curvatureParameterCount(request.type.surface) == 0;
   if (isRevolute(request.type) && !settings.smooth_circle_radius)
     keepLarger(out,
                flat ? std::sqrt(2.0) * settings.factors.plane : settings.factors.lambda,
-               0,
                m);
   state.moments << m.xx, m.xy, m.yy;
   if (!flat)

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <optional>
 
 namespace holdfast {
 namespace {
@@ -24,15 +25,14 @@ hasState(const FitResult& fit)
          fit.state_covariance.cols() == size;
 }
 
-// Of the centre; zero-sized when there is none.
-Eigen::MatrixXd
+std::optional<Eigen::Matrix3d>
 centreCovariance(const FitResult& fit)
 {
   if (hasState(fit))
-    return fit.state_covariance.bottomRightCorner<3, 3>();
+    return Eigen::Matrix3d(fit.state_covariance.bottomRightCorner<3, 3>());
   if (hasCovariance(fit))
-    return fit.covariance.bottomRightCorner<3, 3>();
-  return {};
+    return Eigen::Matrix3d(fit.covariance.bottomRightCorner<3, 3>());
+  return std::nullopt;
 }
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
@@ -91,16 +91,16 @@ normalSigma(const FitResult& fit)
 double
 centreSigma(const FitResult& fit)
 {
-  const Eigen::MatrixXd centre = centreCovariance(fit);
-  return centre.size() > 0 ? std::sqrt(centre.trace()) : kNaN;
+  const auto centre = centreCovariance(fit);
+  return centre ? std::sqrt(centre->trace()) : kNaN;
 }
 
 double
 centreSigma(const FitResult& fit, const Eigen::Vector3d& direction)
 {
-  const Eigen::MatrixXd centre = centreCovariance(fit);
+  const auto centre = centreCovariance(fit);
   const Eigen::Vector3d unit = direction.normalized();
-  return centre.size() > 0 ? std::sqrt(unit.dot(centre * unit)) : kNaN;
+  return centre ? std::sqrt(unit.dot(*centre * unit)) : kNaN;
 }
 
 double

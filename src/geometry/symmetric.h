@@ -4,6 +4,8 @@
 
 #include <Eigen/Core>
 
+#include <cmath>
+
 namespace holdfast { namespace symmetric {
 
 inline constexpr int kSize = 6;
@@ -33,6 +35,28 @@ matrixOf(const Entries& entries)
     for (int j = 0; j < 3; ++j)
       matrix(i, j) = entries[kIndex[i][j]];
   return matrix;
+}
+
+// From the entries xx xy yy of a symmetric matrix in a plane to those in axes turned by
+// W, from the old to the new.
+inline Eigen::Matrix3d
+planeTurn(const Eigen::Matrix2d& W)
+{
+  const double a = W(0, 0), b = W(0, 1), c = W(1, 0), d = W(1, 1);
+  Eigen::Matrix3d T;
+  T << a * a, 2.0 * a * b, b * b, a * c, a * d + b * c, b * d, c * c, 2.0 * c * d,
+      d * d;
+  return T;
+}
+
+// The same for axes turned by an angle.
+inline Eigen::Matrix3d
+planeTurn(double angle)
+{
+  const double c = std::cos(angle), s = std::sin(angle);
+  Eigen::Matrix2d W;
+  W << c, s, -s, c;
+  return planeTurn(W);
 }
 
 }} // namespace holdfast::symmetric

@@ -1,5 +1,6 @@
 #include <holdfast/patch/state.h>
 
+#include "geometry/symmetric.h"
 #include <holdfast/geometry/rotation.h>
 
 #include <Eigen/Geometry>
@@ -29,10 +30,7 @@ squaredBoundPerMoment(PatchType type, double containment)
 Eigen::Vector3d
 turned(const Eigen::Vector3d& m, double angle)
 {
-  const double c = std::cos(angle), s = std::sin(angle);
-  return {c * c * m[0] + 2.0 * s * c * m[1] + s * s * m[2],
-          s * c * (m[2] - m[0]) + (c * c - s * s) * m[1],
-          s * s * m[0] - 2.0 * s * c * m[1] + c * c * m[2]};
+  return symmetric::planeTurn(angle) * m;
 }
 
 /// Angle to the axis of the larger eigenvalue.

@@ -186,6 +186,20 @@ noteZeroPoints(int count, std::string* notice)
 
 } // namespace detail
 
+PointImage
+toPointImage(const RangeCloud& cloud)
+{
+  PointImage image;
+  image.width = static_cast<int>(cloud.points->width);
+  image.height = static_cast<int>(cloud.points->height);
+  image.points.reserve(cloud.points->size());
+  for (const pcl::PointXYZ& point : *cloud.points) {
+    const Eigen::Vector3d q = point.getVector3fMap().cast<double>();
+    image.points.push_back(cloud.sensor_pose.toLocal(q).cast<float>());
+  }
+  return image;
+}
+
 pcl::PointCloud<PointXYZCovariance>
 toPointCloud(const RangeCloud& cloud)
 {

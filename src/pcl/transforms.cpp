@@ -1,5 +1,6 @@
 #include <holdfast/pcl/transforms.h>
 
+#include "geometry/symmetric.h"
 #include <holdfast/geometry/gaussian.h>
 #include <holdfast/geometry/rotation.h>
 #include <holdfast/pcl/conversions.h>
@@ -63,17 +64,6 @@ representationJacobian(const Patch& from, const Patch& to, const Pose& T)
   return A;
 }
 
-/// xx xy yy of a symmetric matrix in axes turned by W, from the old to the new.
-Eigen::Matrix3d
-entriesTurnedBy(const Eigen::Matrix3d& W)
-{
-  const double a = W(0, 0), b = W(0, 1), c = W(1, 0), d = W(1, 1);
-  Eigen::Matrix3d T;
-  T << a * a, 2.0 * a * b, b * b, a * c, a * d + b * c, b * d, c * c, 2.0 * c * d,
-      d * d;
-  return T;
-}
-
 /// The state's own frame follows its normal, and is turned about it by that.
 void
 moveState(const Pose& T, FitResult& moved)
@@ -83,7 +73,7 @@ moveState(const Pose& T, FitResult& moved)
   state.normal = T.R * before.normal;
   state.centre = T.toWorld(before.centre);
   const Eigen::Matrix3d W = state.frame().transpose() * T.R * before.frame();
-  const Eigen::Matrix3d turn = entriesTurnedBy(W);
+  const Eigen::Matrix3d turn = symmetric::planeTurn(W.topLeftCorner<2, 2>());
   state.moments = turn * before.moments;
   state.curvature = turn * before.curvature;
   if (moved.state_covariance.size() == 0)

@@ -26,12 +26,11 @@ using ByMoments =
     Eigen::Matrix<double, Eigen::Dynamic, 9, Eigen::RowMajor, kMaxParameters, 9>;
 using JointMatrix = Eigen::Matrix<double, JointLayout::kSize, JointLayout::kSize>;
 
-// Where the parameters are as good as linear in the points: the second-order terms of
-// their covariance are below kLinear of the first (q3), and NEES/dof of all ten types
-// is 0.985 to 1.010 over 27,000 trials (0.6 to 2 m, tilts to 1.1 rad, 60 to 5000
-// points). That is so where the sigma of the angle of an axis is below kLinearAngle and
-// the curvature of a cylinder above kLinearSigmas; with the second-order terms added,
-// up to the others.
+// Where the parameters count as linear in the points: the second-order terms of their
+// covariance are below kLinear of the first (q3). That is so where the sigma of the
+// angle of an axis is below kLinearAngle and the curvature of a cylinder above
+// kLinearSigmas; with the second-order terms added, up to the others. `experiment
+// consistency --scene sweep` prints what NEES/dof is there.
 constexpr double kLinear = 0.03;
 constexpr double kLinearAngle = 0.03, kSecondOrderAngle = 0.10; // rad
 constexpr double kLinearSigmas = 20.0, kSecondOrderSigmas = 12.0;

@@ -76,8 +76,8 @@ struct FitResult {
   FitFlags flags;
   /// How far from linear the parameters are in the points: the share of second order in
   /// their covariance, trace(S1^-1 C2)/dof; computed in second order, else estimated
-  /// from the sigma of the axis and the curvature in sigmas. Below 0.03 their
-  /// covariance is right within a percent or two.
+  /// from the sigma of the axis and the curvature in sigmas. First-order flags are set
+  /// above 0.03.
   double nonlinearity = 0.0;
   /// By how much the mean of the estimate is off, to second order; empty unless the
   /// covariance was computed to second order. Not applied to the patch.

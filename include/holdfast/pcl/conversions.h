@@ -3,6 +3,7 @@
 
 #include <holdfast/pcl/patch_extraction.h>
 #include <holdfast/pcl/point_types.h>
+#include <holdfast/sensor/noise_calibration.h>
 
 #include <pcl/point_cloud.h>
 
@@ -35,6 +36,9 @@ writeSensorPose(const Pose& pose, pcl::PointCloud<PointT>& cloud)
 template <typename PointT>
 RangeCloud toRangeCloud(const typename pcl::PointCloud<PointT>::ConstPtr& cloud,
                         std::string* notice = nullptr);
+
+/// The points in the camera frame, as the calibration of noise wants them.
+PointImage toPointImage(const RangeCloud& cloud);
 
 /// The points with their covariances inside, NaN if the cloud has none.
 pcl::PointCloud<PointXYZCovariance> toPointCloud(const RangeCloud& cloud);
