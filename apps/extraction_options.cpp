@@ -56,6 +56,19 @@ addTypeOptions(CLI::App& command, FitOptions& fit, const std::string& group)
       ->group(group);
 }
 
+// Of addPatchOptions(): what else is wanted of the covariance.
+void
+addSeparatePattern(CLI::App& command, FitOptions& fit)
+{
+  command
+      .add_flag(
+          "--separate-pattern",
+          fit.separate_pattern,
+          "Give the parts of the state's covariance apart that points share and do "
+          "not share: only the latter averages over frames of a still camera")
+      ->group("Patches");
+}
+
 void
 addPatchOptions(CLI::App& command, ExtractionSettings& settings)
 {
@@ -80,10 +93,12 @@ addPatchOptions(CLI::App& command, ExtractionSettings& settings)
             settings.options.covariance,
             kCovarianceModeNames,
             "Covariance of the parameters: exact to first order; its Gauss-Newton "
-            "approximation; with second-order terms; the paper's chain of stages; or "
-            "1000 refits to resampled points")
+            "approximation; with second-order terms; the paper's chain of stages; 1000 "
+            "refits to resampled points; or exact, with second-order terms where the "
+            "parameters need them")
       ->default_str("exact")
       ->group(group);
+  addSeparatePattern(command, fit);
 }
 
 void

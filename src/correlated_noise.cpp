@@ -44,4 +44,13 @@ CorrelatedNoise::CorrelatedNoise(NoisePattern pattern) : pattern_(std::move(patt
       components_.push_back({wave.sigma * wave.sigma, wave.length_px});
 }
 
+double
+CorrelatedNoise::variance() const
+{
+  double sum = 0.0;
+  for (const Component& wave : components_)
+    sum += wave.variance;
+  return sum;
+}
+
 } // namespace holdfast

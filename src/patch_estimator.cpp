@@ -13,19 +13,17 @@ struct PatchEstimator::Impl {
 namespace {
 
 void
-attach(const PatchFit& fit,
-       const PatchCovariance& uncertainty,
-       CovarianceMode mode,
-       FitResult& result)
+attach(const PatchFit& fit, const PatchCovariance& uncertainty, FitResult& result)
 {
   result.chi2_expected = expectedChi2(fit);
   result.status = statusOf(fit, uncertainty);
   if (!isUsable(result.status))
     return;
-  const Linearity linearity = linearityOf(fit, uncertainty, mode);
+  const Linearity linearity = linearityOf(fit, uncertainty);
   result.flags = linearity.flags;
   result.nonlinearity = linearity.nonlinearity;
   result.state_covariance = uncertainty.state;
+  result.white_state_covariance = uncertainty.white_state;
   result.state_mean_shift = uncertainty.state_shift;
   result.covariance = uncertainty.parameters;
   result.mean_shift = uncertainty.shift;
@@ -56,7 +54,7 @@ PatchEstimator::estimate(PointBatch& batch) const
   if (fit.status == FitStatus::Converged) {
     const PatchCovariance uncertainty =
         patchCovariance(fit, batch, impl_->fitter, impl_->mode);
-    attach(fit, uncertainty, impl_->mode, result);
+    attach(fit, uncertainty, result);
   }
   return result;
 }

@@ -41,7 +41,9 @@ struct Input {
   {
     return boundPatch(
         {type, surface, scatter, has_plane ? &plane : nullptr, {0.7, -1.1, 0.4}},
-        {ContainmentFactors::of(kContainment), smooth});
+        {squaredBoundPerMoment(SurfaceType::EllipticParaboloid, kContainment),
+         squaredBoundPerMoment(SurfaceType::Plane, kContainment),
+         smooth});
   }
 };
 
@@ -163,24 +165,39 @@ jointScale(Model model)
 constexpr double kTolerance = 1e-6;
 
 void
-expectJacobian(const Input& in)
+expectRows(const Eigen::MatrixXd& actual, const Eigen::MatrixXd& expected)
 {
-  const BoundedPatch bounded = in.bound();
-  const Joint scale = jointScale(in.surface.model);
-  const auto parameters = [&](const Eigen::VectorXd& x) -> Eigen::VectorXd {
-    return pack(moved(in, scale.cwiseProduct(Joint(x))).bound().patch);
-  };
-  const Eigen::MatrixXd expected =
-      test::numericalJacobian(parameters,
-                              Eigen::VectorXd::Zero(JointLayout::kSize),
-                              1e-2);
-  const Eigen::MatrixXd actual = bounded.jacobian * scale.asDiagonal();
   for (Eigen::Index row = 0; row < expected.rows(); ++row)
     EXPECT_LT((actual.row(row) - expected.row(row)).cwiseAbs().maxCoeff(),
               kTolerance * (expected.row(row).cwiseAbs().maxCoeff()))
         << "row " << row << "\n"
         << actual.row(row) << "\n"
         << expected.row(row);
+}
+
+// Of the state, and of the parameters through it.
+void
+expectJacobian(const Input& in)
+{
+  const BoundedPatch bounded = in.bound();
+  const Joint scale = jointScale(in.surface.model);
+  const auto at = [&](const Eigen::VectorXd& x) {
+    return moved(in, scale.cwiseProduct(Joint(x))).bound();
+  };
+  const auto derivative = [](const auto& function) -> Eigen::MatrixXd {
+    return test::numericalJacobian(function,
+                                   Eigen::VectorXd::Zero(JointLayout::kSize),
+                                   1e-2);
+  };
+  const Eigen::MatrixXd in_axes = bounded.jacobian * scale.asDiagonal();
+  expectRows(stateByAxes(bounded.axes) * in_axes,
+             derivative([&](const Eigen::VectorXd& x) -> Eigen::VectorXd {
+               return difference(at(x).state, bounded.state);
+             }));
+  expectRows(parametersByAxes(bounded.axes, bounded.squared_bound) * in_axes,
+             derivative([&](const Eigen::VectorXd& x) -> Eigen::VectorXd {
+               return pack(at(x).patch);
+             }));
 }
 
 constexpr std::uint64_t kCases = 20;
@@ -213,7 +230,8 @@ TEST_P(BoundaryFit, PatchIsValidAndOnTheSurface)
     EXPECT_EQ(validityError(bounded.patch), "");
     const Patch again = canonical(bounded.patch);
     EXPECT_LT((pack(again) - pack(bounded.patch)).cwiseAbs().maxCoeff(), 1e-12);
-    EXPECT_EQ(bounded.jacobian.rows(), degreesOfFreedom(GetParam()));
+    EXPECT_EQ(parametersByAxes(bounded.axes, bounded.squared_bound).rows(),
+              degreesOfFreedom(GetParam()));
   }
 }
 
@@ -233,13 +251,14 @@ TEST(BoundaryFitOfParaboloid, JacobianIsTheDerivativeOfThePlane)
     }
 }
 
-TEST(ContainmentFactors, EncloseTheShareOfAGaussian)
+TEST(SquaredBoundPerMoment, EnclosesTheShareOfAGaussian)
 {
   for (const double share : {0.5, 0.9, 0.95, 0.999}) {
-    const ContainmentFactors factors = ContainmentFactors::of(share);
-    // Within +-lambda sigma on a line; within sqrt(2) factor sigma of a plane's centre.
-    EXPECT_NEAR(boost::math::erf(factors.lambda / std::sqrt(2.0)), share, 1e-14);
-    EXPECT_NEAR(1.0 - std::exp(-factors.plane * factors.plane), share, 1e-14);
+    // Within so many sigmas on a line; within as many of a plane's centre.
+    const double line = squaredBoundPerMoment(SurfaceType::Sphere, share);
+    EXPECT_NEAR(boost::math::erf(std::sqrt(0.5 * line)), share, 1e-14);
+    const double plane = squaredBoundPerMoment(SurfaceType::Plane, share);
+    EXPECT_NEAR(1.0 - std::exp(-0.5 * plane), share, 1e-14);
   }
 }
 
@@ -281,6 +300,8 @@ TEST(BoundaryFitStatus, ANormalOppositeToTheWorldsZIsKeptOffTheSingularity)
       const BoundedPatch bounded = in.bound();
       EXPECT_EQ(bounded.status, FitStatus::Converged) << angle;
       EXPECT_TRUE(bounded.jacobian.allFinite()) << angle;
+      EXPECT_TRUE(parametersByAxes(bounded.axes, bounded.squared_bound).allFinite())
+          << angle;
       EXPECT_LT((bounded.patch.normal() - in.surface.R.col(2)).norm(), 2.0 * kRxyMargin)
           << angle;
     }

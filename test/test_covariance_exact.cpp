@@ -176,4 +176,42 @@ INSTANTIATE_TEST_SUITE_P(AllTypes,
                          testing::ValuesIn(kPatchTypes),
                          test::patchTypeName);
 
+// Patches from well to barely told, as noise grows thirtyfold.
+TEST(CovarianceAuto, IsSecondOrderWhereOnlyThatTellsTheParameters)
+{
+  Random random;
+  int exact_ones = 0, second_ones = 0;
+  for (int i = 0; i < 60; ++i) {
+    const PatchType type =
+        kPatchTypes[static_cast<std::size_t>(i) % kPatchTypes.size()];
+    const Sample sample =
+        test::robotSample(type, std::exp(random.uniform(-1.0, 3.5)), random);
+    const FitOptions options = test::optionsFor(type, FitOptions{});
+    const FitResult exact = fitted(sample, options);
+    const FitResult second = fitted(sample, options, CovarianceMode::SecondOrder);
+    const FitResult automatic = fitted(sample, options, CovarianceMode::Auto);
+    if (!isUsable(exact.status))
+      continue;
+    const auto axis_lost = [](const FitResult& fit) {
+      return fit.flags.axis_not_observable || fit.flags.curvature_not_observable;
+    };
+    const bool is_second = automatic.mean_shift.size() > 0;
+    EXPECT_EQ(automatic.covariance, is_second ? second.covariance : exact.covariance);
+    EXPECT_EQ(automatic.state_covariance,
+              is_second ? second.state_covariance : exact.state_covariance);
+    if (!axis_lost(exact)) {
+      EXPECT_FALSE(is_second);
+      ++exact_ones;
+    }
+    else if (is_second) {
+      ++second_ones;
+    }
+    else {
+      EXPECT_TRUE(axis_lost(automatic));
+    }
+  }
+  EXPECT_GT(exact_ones, 0);
+  EXPECT_GT(second_ones, 0);
+}
+
 }} // namespace holdfast

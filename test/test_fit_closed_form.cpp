@@ -71,10 +71,8 @@ extentOf(PatchType type)
 Eigen::Matrix<double, 5, 1>
 expectedBounds(PatchType type, const Eigen::Vector2d& m)
 {
-  const ContainmentFactors factors = ContainmentFactors::of(FitOptions{}.containment);
-  const double factor = type.surface == SurfaceType::Plane ?
-                            std::sqrt(2.0) * factors.plane :
-                            factors.lambda;
+  const double factor =
+      std::sqrt(squaredBoundPerMoment(type.surface, FitOptions{}.containment));
   Eigen::Matrix<double, 5, 1> d = Eigen::Matrix<double, 5, 1>::Zero();
   if (type.boundary == BoundaryType::Quad) {
     d.head<4>().setConstant(factor * std::sqrt(m.sum()));

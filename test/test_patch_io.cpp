@@ -127,6 +127,19 @@ TEST(PatchIo, JsonComesBackBitForBit)
   }
 }
 
+TEST(PatchIo, FilesOfALaterSchemaAreRefused)
+{
+  auto json =
+      nlohmann::ordered_json::parse(jsonText(someReport(), JsonLayout::PatchPerLine));
+  json.erase("schema"); // as files of the first version
+  EXPECT_NO_THROW(readJson(json.dump()));
+  for (const nlohmann::ordered_json& other :
+       {nlohmann::ordered_json(0), nlohmann::ordered_json(1000)}) {
+    json["schema"] = other;
+    EXPECT_THROW(readJson(json.dump()), std::runtime_error) << other;
+  }
+}
+
 TEST(PatchIo, JsonHasTheDocumentedMembers)
 {
   const auto json =
@@ -136,6 +149,7 @@ TEST(PatchIo, JsonHasTheDocumentedMembers)
     members.push_back(item.key());
   EXPECT_EQ(members,
             (std::vector<std::string>{"holdfast",
+                                      "schema",
                                       "cloud",
                                       "sensor",
                                       "offset",

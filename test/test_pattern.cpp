@@ -67,7 +67,11 @@ disc(double radius_px,
 }
 
 // Covariance of gradient and moments by the sum over all pairs of points.
-Eigen::MatrixXd
+struct PairSums {
+  Eigen::MatrixXd white, shared;
+};
+
+PairSums
 overAllPairs(const PatchFit& fit, const PointBatch& batch, const FitOptions& options)
 {
   const UnboundedSurface& surface = fit.surface.surface;
@@ -112,7 +116,7 @@ overAllPairs(const PatchFit& fit, const PointBatch& batch, const FitOptions& opt
       C(i, j) = batch.pattern()->pattern().covariance(std::hypot(
           batch.channel(PointBatch::U)[i] - batch.channel(PointBatch::U)[j],
           batch.channel(PointBatch::V)[i] - batch.channel(PointBatch::V)[j]));
-  return white + Y * C * Y.transpose();
+  return {white, Y * C * Y.transpose()};
 }
 
 Eigen::MatrixXd
@@ -152,8 +156,9 @@ compare(PointBatch& batch)
   EXPECT_EQ(fit.surface.status, FitStatus::Converged);
   const Linearization& l = fit.surface.linearization;
   const Eigen::MatrixXd J = jacobian(l);
+  const PairSums sums = overAllPairs(fit, batch, options);
   const Eigen::MatrixXd pairs =
-      (J * overAllPairs(fit, batch, options) * J.transpose()).topLeftCorner(6, 6);
+      (J * (sums.white + sums.shared) * J.transpose()).topLeftCorner(6, 6);
   const Eigen::MatrixXd cells = (J * overCells(l) * J.transpose()).topLeftCorner(6, 6);
   const Eigen::VectorXd scale = pairs.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd a = scale.asDiagonal() * cells * scale.asDiagonal();
@@ -190,6 +195,43 @@ TEST(Pattern, OverCellsIsNearTheSumOverAllPairs)
     nees += found.nees / kPatches;
   }
   EXPECT_NEAR(nees, 1.0, 0.03);
+}
+
+// White errors are summed point by point: both sums are the same but for rounding.
+TEST(Pattern, CanBeToldFromWhiteErrors)
+{
+  Random random;
+  for (int patch = 0; patch < 10; ++patch) {
+    PointBatch batch = disc(random.uniform(10.0, 30.0),
+                            2,
+                            random.uniform(-4.0, 4.0),
+                            random.uniform(0.0, 1.0),
+                            kinectPattern());
+    FitOptions options;
+    options.surface = SurfaceRequest::Paraboloid;
+    options.separate_pattern = true;
+    const PatchFit fit = PatchFitter(options).fit(batch);
+    ASSERT_TRUE(fit.surface.white);
+    const Linearization& white = *fit.surface.white;
+    const Eigen::MatrixXd pairs = overAllPairs(fit, batch, options).white;
+    Eigen::MatrixXd sums = pairs;
+    sums.topLeftCorner<6, 6>() = white.XX;
+    sums.topRightCorner<6, 9>() = white.XD;
+    sums.bottomRightCorner<9, 9>() = white.DD;
+    sums.triangularView<Eigen::StrictlyLower>() = sums.transpose();
+    const Eigen::VectorXd scale = pairs.diagonal().cwiseSqrt().cwiseInverse();
+    EXPECT_LT((scale.asDiagonal() * (sums - pairs) * scale.asDiagonal())
+                  .cwiseAbs()
+                  .maxCoeff(),
+              1e-9);
+
+    const FitResult whole = estimatePatch(batch, FitOptions{});
+    EXPECT_EQ(whole.white_state_covariance.size(), 0);
+    const FitResult apart = estimatePatch(batch, options);
+    const Eigen::VectorXd total = apart.state_covariance.diagonal();
+    const Eigen::VectorXd own = apart.white_state_covariance.diagonal();
+    EXPECT_TRUE((own.array() > 0.0).all() && (own.array() < total.array()).all());
+  }
 }
 
 // Nothing is summed where nothing is shared: to the last bit.

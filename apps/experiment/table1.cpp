@@ -71,13 +71,13 @@ squaredCovariance(const PatchFit& fit)
   return covariance;
 }
 
-/// All modes but the one that is the truth here.
+/// All modes but the one that is the truth here, and the one that is either of two.
 std::vector<CovarianceMode>
 analyticModes()
 {
   std::vector<CovarianceMode> modes;
   for (const CovarianceMode mode : kAllCovarianceModes)
-    if (mode != CovarianceMode::MonteCarlo)
+    if (mode != CovarianceMode::MonteCarlo && mode != CovarianceMode::Auto)
       modes.push_back(mode);
   return modes;
 }

@@ -36,6 +36,9 @@ public:
     return components_;
   }
 
+  /// Of a single pixel.
+  double variance() const;
+
 private:
   NoisePattern pattern_;
   std::vector<Component> components_;

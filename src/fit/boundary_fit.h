@@ -2,40 +2,33 @@
 ///
 /// The bounds are functions of the projected points' moments, so the whole patch is a
 /// function of theta (the surface), of the nine moments s and, where the normal comes
-/// from a weighted plane, of that plane's theta. boundPatch() gives its value and its
-/// Jacobian, as a state and in the paper's parameters.
+/// from a weighted plane, of that plane's theta. boundPatch() gives its state and the
+/// Jacobian of that; the paper's parameters follow from the state
+/// (patch/state_parameters.h).
 #pragma once
 
+#include "patch/state_parameters.h"
 #include "placement.h"
 #include "surface_fit.h"
-#include <holdfast/patch/state.h>
 
 namespace holdfast {
 
-/// d[d | k | r | c] / d joint; as many rows as the patch has parameters.
+/// d[M | k | nu | c] / d joint.
 using PatchJacobian = Eigen::Matrix<double,
                                     Eigen::Dynamic,
                                     JointLayout::kSize,
                                     Eigen::RowMajor | Eigen::DontAlign,
-                                    kMaxParameters,
+                                    kMaxState,
                                     JointLayout::kSize>;
-
-/// lambda = sqrt(2) erfinv(Gamma) of stage II-4, and sqrt(-ln(1 - Gamma)) of II-9.
-struct ContainmentFactors {
-  double lambda = 0.0;
-  double plane = 0.0;
-
-  /// \param containment Gamma in (0, 1).
-  static ContainmentFactors of(double containment);
-};
 
 struct BoundedPatch {
   /// Converged, Degenerate (no extent, or no direction for z), CurvatureSignMismatch.
   FitStatus status = FitStatus::Converged;
-  Patch patch;
-  PatchJacobian jacobian;
   PatchState state;
-  PatchJacobian state_jacobian; ///< d[M | k | nu | c] / d joint
+  Patch patch;
+  StateAxes axes; ///< the state in the axes of the patch
+  PatchJacobian jacobian; ///< of the state in these axes
+  double squared_bound = 0.0; ///< squaredBoundPerMoment() of its type
 };
 
 /// What is to be bounded, for one call: it refers to what it is made of.
@@ -51,7 +44,8 @@ struct BoundRequest {
 
 /// How it is bounded, the same for every patch.
 struct BoundSettings {
-  ContainmentFactors factors;
+  double squared_bound = 0.0; ///< squaredBoundPerMoment() of curved surfaces
+  double squared_plane_bound = 0.0; ///< and of planes
   bool smooth_circle_radius = true; ///< see FitOptions
   bool centre_on_normal_line = true; ///< see FitOptions
 };

@@ -32,13 +32,13 @@ curvatureInRange(const SurfaceFit& fit, double limit)
 }
 
 // True when the paraboloid rises by less than the limit at the bounds along the points'
-// longer axis: kappa d^2 / 2, d = lambda sqrt(moment).
+// longer axis: kappa d^2 / 2.
 bool
-isFlatWithin(double limit, const PatchFit& fit, double lambda)
+isFlatWithin(double limit, const PatchFit& fit, double squared_bound)
 {
   const double curvature = models::Paraboloid::largestCurvature(fit.surface.surface.k);
-  const double squared_bound = lambda * lambda * fit.scatter.eigenvalues[2];
-  return 0.5 * curvature * squared_bound < limit;
+  const double squared = squared_bound * fit.scatter.eigenvalues[2];
+  return 0.5 * curvature * squared < limit;
 }
 
 SurfaceType
@@ -55,7 +55,11 @@ PatchFitter::PatchFitter(const FitOptions& options) : options_(options)
   const std::string error = validityError(options);
   if (!error.empty())
     throw std::invalid_argument(error);
-  bound_settings_ = {ContainmentFactors::of(options.containment),
+  const auto squaredBound = [&](SurfaceType surface) {
+    return squaredBoundPerMoment(surface, options.containment);
+  };
+  bound_settings_ = {squaredBound(SurfaceType::EllipticParaboloid),
+                     squaredBound(SurfaceType::Plane),
                      options.smooth_circle_radius,
                      options.centre_on_normal_line};
   thresholds_ = DiscriminationThresholds::atLevel(options.discrimination_level);
@@ -77,7 +81,7 @@ PatchFitter::patchType(const PatchFit& fit) const
     return typed(signedType(surface.surface.k));
   const ThetaMatrix covariance =
       thetaCovariance(surface.linearization, surface.linearization.H);
-  if (isFlatWithin(options_.flat_within_m, fit, bound_settings_.factors.lambda))
+  if (isFlatWithin(options_.flat_within_m, fit, bound_settings_.squared_bound))
     return typed(SurfaceType::Plane);
   return typed(discriminate(surface.surface.k,
                             covariance.topLeftCorner<3, 3>(),

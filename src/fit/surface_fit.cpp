@@ -264,11 +264,29 @@ public:
 
   void run(const UnboundedSurface& surface, kernel::CovarianceSums& sums) const
   {
-    kernel::kernel().accumulateCovariance(problem_.model,
-                                          problem_.residual,
-                                          points_,
-                                          kernelState(surface, problem_.scatter),
-                                          sums);
+    accumulate(points_, surface, sums);
+  }
+
+  // What errors make that points do not share: of every point's variance, the pattern's
+  // is taken away.
+  Linearization white(const UnboundedSurface& surface) const
+  {
+    kernel::CovarianceSums sums;
+    Linearization result;
+    if (points_.pattern == nullptr) {
+      run(surface, sums);
+      linearize(surface, problem_.scatter, sums, result);
+      return result;
+    }
+    const std::vector<double> less(static_cast<std::size_t>(points_.padded_size),
+                                   -problem_.batch.pattern()->variance());
+    kernel::PatternPoints pattern = pattern_;
+    pattern.extra = less.data();
+    kernel::Points points = points_;
+    points.pattern = &pattern;
+    accumulate(points, surface, sums);
+    linearize(surface, problem_.scatter, sums, result);
+    return result;
   }
 
   // After the last run, at the same surface.
@@ -283,6 +301,17 @@ public:
   }
 
 private:
+  void accumulate(const kernel::Points& points,
+                  const UnboundedSurface& surface,
+                  kernel::CovarianceSums& sums) const
+  {
+    kernel::kernel().accumulateCovariance(problem_.model,
+                                          problem_.residual,
+                                          points,
+                                          kernelState(surface, problem_.scatter),
+                                          sums);
+  }
+
   const SurfaceProblem& problem_;
   kernel::Points points_;
   kernel::PatternPoints pattern_{};
@@ -321,6 +350,8 @@ polish(const SurfaceProblem& problem, const FitOptions& options, SurfaceFit& fit
         std::sqrt(std::max(0.0, -step.dot(gradient))) < options.polish_tolerance_sigma;
     if (arrived)
       pass.addPattern(fit.surface, fit.linearization);
+    if (arrived && options.separate_pattern)
+      fit.white = pass.white(fit.surface);
     fit.surface = retractedSurface(fit.surface, problem.scatter, step);
     if (arrived) {
       fit.status = FitStatus::Converged;

@@ -8,6 +8,8 @@
 
 #include <Eigen/Core>
 
+#include <optional>
+
 namespace holdfast {
 
 /// The moments s of the points: mean (3), then scatter xx xy xz yy yz zz (6).
@@ -40,6 +42,8 @@ struct SurfaceFit {
   int polish_steps = 0;
   ThetaMatrix JtJ = ThetaMatrix::Identity(); ///< Gauss-Newton part of the Hessian
   Linearization linearization;
+  /// The same with the errors alone that points do not share; when asked for.
+  std::optional<Linearization> white;
   /// Undetermined directions of theta; no column unless Degenerate.
   NullSpace null_space = NullSpace(6, 0);
 };

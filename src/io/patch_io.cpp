@@ -29,6 +29,11 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+/// Of the JSON, raised where a reader of the former one would go wrong: 2 since patches
+/// have a state, and null in the covariance of parameters that are not observable.
+/// Files of version 1 do not name it.
+constexpr int kSchema = 2;
+
 template <typename Derived>
 Json
 vectorJson(const Eigen::MatrixBase<Derived>& v)
@@ -210,7 +215,11 @@ patchJson(const ExtractedPatch& extracted, const PatchReport& report)
 {
   const FitResult& fit = extracted.fit;
   const PatchType type = fit.patch.type;
-  const CovarianceMode mode = report.options.covariance;
+  const bool second_order = fit.mean_shift.size() > 0;
+  const CovarianceMode mode = report.options.covariance != CovarianceMode::Auto ?
+                                  report.options.covariance :
+                              second_order ? CovarianceMode::SecondOrder :
+                                             CovarianceMode::Exact;
   Patch in_file = fit.patch;
   in_file.c += report.offset;
   PatchState state = fit.state;
@@ -248,10 +257,15 @@ patchJson(const ExtractedPatch& extracted, const PatchReport& report)
                         {"largest", validation->residual.largest_m}};
     json["coverage"] = validation->coverage.share;
   }
-  if (mode == CovarianceMode::SecondOrder)
+  if (second_order) {
     json["mean_shift"] = vectorJson(fit.mean_shift);
-  if (mode == CovarianceMode::SecondOrder)
     json["state_mean_shift"] = vectorJson(fit.state_mean_shift);
+  }
+  if (fit.white_state_covariance.size() > 0) {
+    const StateMatrix pattern = fit.state_covariance - fit.white_state_covariance;
+    json["state_covariance_white"] = matrixJson(fit.white_state_covariance);
+    json["state_covariance_pattern"] = matrixJson(pattern);
+  }
   return json;
 }
 
@@ -422,6 +436,18 @@ patchFromJson(const Json& json, double containment)
   return extracted;
 }
 
+void
+requireKnownSchema(const Json& json)
+{
+  if (!json.contains("schema"))
+    return;
+  const int schema = wholeNumber(json, "schema");
+  if (schema < 1 || schema > kSchema)
+    throw std::runtime_error("written by another version of holdfast: schema " +
+                             std::to_string(schema) + ", this one reads up to " +
+                             std::to_string(kSchema));
+}
+
 /// All meshes as one.
 struct ColoredMesh {
   std::vector<Eigen::Vector3d> vertices;
@@ -521,6 +547,7 @@ writeJson(std::ostream& out, const PatchReport& report, JsonLayout layout)
   };
   out << '{' << gap;
   member("holdfast", HOLDFAST_VERSION);
+  member("schema", kSchema);
   member("cloud", report.cloud);
   if (report.timestamp_us)
     member("timestamp_us", *report.timestamp_us);
@@ -547,6 +574,7 @@ readJson(const std::string& text)
 {
   try {
     const Json json = Json::parse(text);
+    requireKnownSchema(json);
     PatchReport report;
     report.cloud = json.at("cloud");
     const double containment =

@@ -1,30 +1,16 @@
 #include <holdfast/patch/state.h>
 
 #include "geometry/symmetric.h"
+#include "patch/state_parameters.h"
 #include <holdfast/geometry/rotation.h>
 
 #include <Eigen/Geometry>
-
-#include <boost/math/special_functions/erf.hpp>
 
 #include <cmath>
 #include <stdexcept>
 
 namespace holdfast {
 namespace {
-
-/// d^2 over the moment it belongs to: 2 erfinv(Gamma)^2 of stage II-4 for what is
-/// bounded axis by axis, -2 ln(1 - Gamma) of II-9 for planes.
-double
-squaredBoundPerMoment(PatchType type, double containment)
-{
-  if (!(containment > 0.0 && containment < 1.0))
-    throw std::invalid_argument("holdfast: containment must lie between 0 and 1");
-  if (type.surface == SurfaceType::Plane)
-    return -2.0 * std::log1p(-containment);
-  const double quantile = boost::math::erf_inv(containment);
-  return 2.0 * quantile * quantile;
-}
 
 /// xx xy yy of a symmetric matrix in axes turned by the angle.
 Eigen::Vector3d
@@ -33,52 +19,7 @@ turned(const Eigen::Vector3d& m, double angle)
   return symmetric::planeTurn(angle) * m;
 }
 
-/// Angle to the axis of the larger eigenvalue.
-double
-angleOfLarger(const Eigen::Vector3d& m)
-{
-  return 0.5 * std::atan2(2.0 * m[1], m[0] - m[2]);
-}
-
-/// Angle of the patch's x axis: of planes that of the larger moment, of curved surfaces
-/// that of the smaller |curvature|.
-double
-angleOfX(const PatchState& state)
-{
-  if (state.type.surface == SurfaceType::Plane)
-    return angleOfLarger(state.moments);
-  constexpr double kQuarterTurn = 1.5707963267948966;
-  const double mean = 0.5 * (state.curvature[0] + state.curvature[2]);
-  return angleOfLarger(state.curvature) + (mean > 0.0 ? kQuarterTurn : 0.0);
-}
-
-Eigen::Matrix3d
-turnedAboutNormal(const Eigen::Matrix3d& R, double angle)
-{
-  return R * expMap({0.0, 0.0, angle});
-}
-
-/// Bounds from the moments along the patch's own axes.
-void
-bound(const Eigen::Vector3d& m, double squared, Patch& patch)
-{
-  switch (patch.type.boundary) {
-  case BoundaryType::Circle:
-    patch.d[0] = std::sqrt(squared * 0.5 * (m[0] + m[2]));
-    break;
-  case BoundaryType::Quad:
-    patch.d.head<4>().setConstant(std::sqrt(squared * (m[0] + m[2])));
-    patch.d[4] = std::atan2(std::sqrt(m[2]), std::sqrt(m[0]));
-    break;
-  case BoundaryType::Ellipse:
-  case BoundaryType::Rectangle:
-    patch.d[0] = std::sqrt(squared * m[0]);
-    patch.d[1] = std::sqrt(squared * m[2]);
-    break;
-  }
-}
-
-/// Moments along the patch's own axes from its bounds: the inverse of bound().
+/// Moments along the patch's own axes from its bounds: as patchOf() makes them.
 Eigen::Vector3d
 momentsOf(const Patch& patch, double squared)
 {
@@ -215,33 +156,13 @@ difference(const PatchState& state, const PatchState& reference)
 Patch
 toPatch(const PatchState& state, double containment)
 {
-  const double squared = squaredBoundPerMoment(state.type, containment);
-  Patch patch;
-  patch.type = state.type;
-  patch.c = state.centre;
-  if (isRevolute(state.type)) {
-    bound(state.moments, squared, patch);
-    if (curvatureParameterCount(state.type.surface) == 1)
-      patch.kappa[0] = 0.5 * (state.curvature[0] + state.curvature[2]);
-    patch.r << regularRxyFromNormal(state.normal), 0.0;
-    return patch;
-  }
-  const double angle = angleOfX(state);
-  bound(turned(state.moments, angle), squared, patch);
-  const Eigen::Vector3d k = turned(state.curvature, angle);
-  const int curvatures = curvatureParameterCount(state.type.surface);
-  if (curvatures == 1)
-    patch.kappa[0] = k[2];
-  else if (curvatures == 2)
-    patch.kappa << k[0], k[2];
-  patch.r = logMap(turnedAboutNormal(state.frame(), angle));
-  return canonical(patch);
+  return patchOf(axesOf(state), squaredBoundPerMoment(state.type.surface, containment));
 }
 
 PatchState
 toState(const Patch& patch, double containment)
 {
-  const double squared = squaredBoundPerMoment(patch.type, containment);
+  const double squared = squaredBoundPerMoment(patch.type.surface, containment);
   PatchState state;
   state.type = patch.type;
   state.normal = patch.normal();

@@ -87,6 +87,8 @@ moveState(const Pose& T, FitResult& moved)
   J.block<2, 2>(layout.nu(), layout.nu()) = W.topLeftCorner<2, 2>();
   J.bottomRightCorner<3, 3>() = T.R;
   moved.state_covariance = propagate(J, moved.state_covariance);
+  if (moved.white_state_covariance.size() > 0)
+    moved.white_state_covariance = propagate(J, moved.white_state_covariance);
   if (moved.state_mean_shift.size() > 0)
     moved.state_mean_shift = J * moved.state_mean_shift;
 }

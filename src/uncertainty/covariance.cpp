@@ -151,15 +151,16 @@ patternTerms(const PatternMatrix& pattern, const ByTheta& G, const ByMoments& M)
 
 // Of what has the Jacobian F to the joint variables.
 // \param inverse of the Hessian
+// \param l of fit.surface, with all errors or some of them
 ParameterMatrix
 firstOrderCovariance(const PatchJacobian& F,
                      const ThetaMatrix& inverse,
+                     const Linearization& l,
                      const PatchFit& fit,
                      const PointBatch& batch,
                      const FitOptions& options,
                      CovarianceMode mode)
 {
-  const Linearization& l = fit.surface.linearization;
   // d(estimate)/dq_i = G X_i + M D_i. lazyProduct: for matrices this small Eigen's
   // blocked product costs several times the work.
   const ByTheta G = gain(F.middleCols<6>(JointLayout::kTheta), inverse);
@@ -174,6 +175,15 @@ firstOrderCovariance(const PatchJacobian& F,
   if (fit.has_plane_stage)
     covariance += planeStageTerms(fit, batch, options, F, G, M, mode);
   return symmetrized(covariance);
+}
+
+// J S J^T; gaussian.h has it for matrices of any size, with Eigen's blocked product.
+template <typename Jacobian>
+ParameterMatrix
+propagated(const Jacobian& J, const ParameterMatrix& S)
+{
+  return symmetrized(
+      ParameterMatrix(J.lazyProduct(S).eval().lazyProduct(J.transpose())));
 }
 
 // Covariance of the joint variables (JointLayout).
@@ -348,15 +358,13 @@ statusOf(const PatchFit& fit, const PatchCovariance& uncertainty)
 }
 
 Linearity
-linearityOf(const PatchFit& fit,
-            const PatchCovariance& uncertainty,
-            CovarianceMode mode)
+linearityOf(const PatchFit& fit, const PatchCovariance& uncertainty)
 {
   const Patch& patch = fit.bounded.patch;
   const ParameterMatrix& S = uncertainty.parameters;
   const double axis = axisSigma(patch, S), curvature = curvatureInSigmas(patch, S);
   const bool round = patch.type.surface == SurfaceType::Sphere;
-  const bool second = mode == CovarianceMode::SecondOrder;
+  const bool second = uncertainty.shift.size() > 0;
   Linearity linearity;
   FitFlags& flags = linearity.flags;
   const double largest_angle = second ? kSecondOrderAngle : kLinearAngle;
@@ -392,6 +400,20 @@ monteCarlo(const PatchFit& fit, const PointBatch& batch, const FitOptions& optio
   result.state = drawn.state_covariance;
   result.parameters = drawn.covariance;
   return result;
+}
+
+// True where the parameters are linear enough for second order to hold, but not for
+// first order alone.
+bool
+asksForSecondOrder(const PatchFit& fit, const PatchCovariance& exact)
+{
+  const Patch& patch = fit.bounded.patch;
+  const double axis = axisSigma(patch, exact.parameters);
+  const double curvature = patch.type.surface == SurfaceType::Sphere ?
+                               std::numeric_limits<double>::infinity() :
+                               curvatureInSigmas(patch, exact.parameters);
+  const bool first = axis <= kLinearAngle && curvature >= kLinearSigmas;
+  return !first && axis <= kSecondOrderAngle && curvature >= kSecondOrderSigmas;
 }
 
 void
@@ -433,14 +455,27 @@ patchCovariance(const PatchFit& fit,
   if (mode == CovarianceMode::MonteCarlo)
     return monteCarlo(fit, batch, options);
   const ThetaMatrix inverse = symmetricInverse(hessianOf(fit.surface, mode));
-  const auto firstOrder = [&](const PatchJacobian& F) {
-    return firstOrderCovariance(F, inverse, fit, batch, options, mode);
+  const BoundedPatch& bounded = fit.bounded;
+  const auto inAxes = [&](const Linearization& l) {
+    return firstOrderCovariance(bounded.jacobian,
+                                inverse,
+                                l,
+                                fit,
+                                batch,
+                                options,
+                                mode);
   };
-  result.state = firstOrder(fit.bounded.state_jacobian);
-  result.parameters = mode == CovarianceMode::Stagewise ?
-                          stagewiseCovariance(fit, batch, options) :
-                          firstOrder(fit.bounded.jacobian);
-  if (mode == CovarianceMode::SecondOrder)
+  const StateMatrix S = inAxes(fit.surface.linearization);
+  const StateMatrix turn = stateByAxes(bounded.axes);
+  result.state = propagated(turn, S);
+  if (fit.surface.white)
+    result.white_state = propagated(turn, inAxes(*fit.surface.white));
+  result.parameters =
+      mode == CovarianceMode::Stagewise ?
+          stagewiseCovariance(fit, batch, options) :
+          propagated(parametersByAxes(bounded.axes, bounded.squared_bound), S);
+  if (mode == CovarianceMode::SecondOrder ||
+      (mode == CovarianceMode::Auto && asksForSecondOrder(fit, result)))
     addSecondOrder(fit, batch, fitter, result);
   return result;
 }

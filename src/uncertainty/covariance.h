@@ -13,11 +13,12 @@ namespace holdfast {
 /// [d | k | r | c].
 struct PatchCovariance {
   StateMatrix state; ///< 0 x 0 when there is none
+  StateMatrix white_state; ///< 0 x 0 when not asked for: FitOptions::separate_pattern
   ParameterMatrix parameters; ///< 0 x 0 when there is none
-  StateVector state_shift; ///< SecondOrder only, else empty
-  ParameterVector shift; ///< SecondOrder only, else empty
+  StateVector state_shift; ///< likewise
+  ParameterVector shift; ///< where second order was added, else empty
   /// trace(S1^-1 C2)/dof of the parameters, C2 the second-order terms and S1 what the
-  /// rest is; NaN where it was not computed (SecondOrder).
+  /// rest is; NaN where second order was not added.
   double nonlinearity = std::numeric_limits<double>::quiet_NaN();
 };
 
@@ -51,8 +52,6 @@ struct Linearity {
   FitFlags flags;
 };
 
-Linearity linearityOf(const PatchFit& fit,
-                      const PatchCovariance& uncertainty,
-                      CovarianceMode mode);
+Linearity linearityOf(const PatchFit& fit, const PatchCovariance& uncertainty);
 
 } // namespace holdfast

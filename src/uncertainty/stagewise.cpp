@@ -50,6 +50,13 @@ axesOf(const UnboundedSurface& surface, const Scatter& scatter)
   return axes;
 }
 
+// By how many sigmas of the points a bound is away.
+double
+boundPerSigma(SurfaceType surface, const FitOptions& options)
+{
+  return std::sqrt(squaredBoundPerMoment(surface, options.containment));
+}
+
 // The chain for one fit. It runs in the axes of the fitted surface, where no r_xy is
 // near the singularity of its chart; the covariance does not depend on the frame.
 class Chain {
@@ -57,7 +64,8 @@ public:
   Chain(const PatchFit& fit, const PointBatch& batch, const FitOptions& options)
   : fit_(fit)
   , batch_(batch)
-  , factors_(ContainmentFactors::of(options.containment))
+  , lambda_(boundPerSigma(SurfaceType::EllipticParaboloid, options))
+  , plane_factor_(boundPerSigma(SurfaceType::Plane, options) / std::sqrt(2.0))
   , smooth_(options.smooth_circle_radius)
   , axes_(axesOf(fit.surface.surface, fit.scatter))
   , patch_x_(axes_.pose.R.transpose() * expMap(fit.bounded.patch.r).col(0))
@@ -198,7 +206,7 @@ private:
   {
     return inWorld<3, 3>(
         axes_.pose,
-        propagated([&](const Vec<12>& x) { return cylinderBound(factors_.lambda, x); },
+        propagated([&](const Vec<12>& x) { return cylinderBound(lambda_, x); },
                    withMoments<1, 3>(axes_, surface)));
   }
 
@@ -212,9 +220,8 @@ private:
                    surface);
     return inWorld<2, 2>(
         world.pose,
-        propagated(
-            [&](const Vec<11>& x) { return circleBound(factors_.lambda, smooth_, x); },
-            withMoments<1, 2>(world, moved)));
+        propagated([&](const Vec<11>& x) { return circleBound(lambda_, smooth_, x); },
+                   withMoments<1, 2>(world, moved)));
   }
 
   // Stage II-8.
@@ -222,7 +229,7 @@ private:
   {
     return inWorld<4, 3>(
         axes_.pose,
-        propagated([&](const Vec<13>& x) { return ellipseBound(factors_.lambda, x); },
+        propagated([&](const Vec<13>& x) { return ellipseBound(lambda_, x); },
                    withMoments<2, 3>(axes_, surface)));
   }
 
@@ -230,14 +237,14 @@ private:
   ChainResult boundedPlane(const Estimate<5>& surface) const
   {
     const auto x =
-        propagated([&](const Vec<10>& in) { return planeAxes(factors_.plane, in); },
+        propagated([&](const Vec<10>& in) { return planeAxes(plane_factor_, in); },
                    withMoments<0, 2>(axes_, surface));
     const BoundaryType boundary = fit_.bounded.patch.type.boundary;
     if (boundary == BoundaryType::Circle)
       return inWorld<1, 2>(axes_.pose,
                            propagated(
                                [&](const Vec<10>& in) {
-                                 return planeCircle(factors_.plane, smooth_, in);
+                                 return planeCircle(plane_factor_, smooth_, in);
                                },
                                x));
     const Vec<8> forward = planeEllipse(false, x.mean).value;
@@ -263,7 +270,8 @@ private:
 
   const PatchFit& fit_;
   const PointBatch& batch_;
-  ContainmentFactors factors_;
+  double lambda_; // of stage II-4: sqrt(2) erfinv(Gamma)
+  double plane_factor_; // of II-9: sqrt(-ln(1 - Gamma))
   bool smooth_;
   Axes axes_; // of the fitted surface
   Vector3d patch_x_; // x axis of the result, in axes_

@@ -287,7 +287,8 @@ LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size)
   constexpr std::array kModes{CovarianceMode::Exact,
                               CovarianceMode::GaussNewton,
                               CovarianceMode::SecondOrder,
-                              CovarianceMode::Stagewise};
+                              CovarianceMode::Stagewise,
+                              CovarianceMode::Auto};
   Bytes bytes(data, size);
   const CovarianceMode mode = kModes[bytes.take<std::uint8_t>() % kModes.size()];
   const FitOptions options = takeOptions(bytes);

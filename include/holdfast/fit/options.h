@@ -101,6 +101,10 @@ struct FitOptions {
   /// Points whose covariance is (nearly) zero are given this isotropic sigma, m.
   double sigma_floor_m = 1e-6;
 
+  /// Gives the part of the state's covariance that no pattern has made on its own, too:
+  /// FitResult::white_state_covariance.
+  bool separate_pattern = false;
+
   // Departures from the paper that make the estimate unbiased; see paper().
   Residual residual = Residual::Ray;
   /// Subtract the mean point covariance from the scatter matrix before PCA and moments:

@@ -70,6 +70,10 @@ struct FitResult {
   /// 0 x 0 when not usable.
   PatchState state;
   StateMatrix state_covariance;
+  /// What of state_covariance errors make that points do not share: it averages over
+  /// frames, while the rest, the pattern, does not as long as the camera stands still.
+  /// 0 x 0 unless asked for (FitOptions::separate_pattern).
+  StateMatrix white_state_covariance;
   /// Covariance of [d | k | r | c] (holdfast/patch/parameters.h); 0 x 0 when not
   /// usable. Where flags are set see observableCovariance().
   ParameterMatrix covariance;

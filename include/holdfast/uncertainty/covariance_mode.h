@@ -20,7 +20,10 @@ enum class CovarianceMode : std::uint8_t {
   Stagewise,
   /// Resample and refit, 1000 times: the referee
   /// (holdfast/uncertainty/monte_carlo.h).
-  MonteCarlo
+  MonteCarlo,
+  /// Exact, but SecondOrder for patches whose parameters are observable to second order
+  /// alone (FitFlags). Of those it costs as much.
+  Auto
 };
 
 /// Every mode, in the order of the enumeration.
@@ -28,7 +31,8 @@ inline constexpr std::array kAllCovarianceModes{CovarianceMode::Exact,
                                                 CovarianceMode::GaussNewton,
                                                 CovarianceMode::SecondOrder,
                                                 CovarianceMode::Stagewise,
-                                                CovarianceMode::MonteCarlo};
+                                                CovarianceMode::MonteCarlo,
+                                                CovarianceMode::Auto};
 
 /// "exact", "gauss_newton", ... as in the program's JSON.
 std::string_view covarianceModeName(CovarianceMode mode);

@@ -6,7 +6,7 @@
 
 namespace holdfast {
 
-inline constexpr EnumNames<CovarianceMode, 5> kCovarianceModeNames{
-    {"exact", "gauss_newton", "second_order", "stagewise", "monte_carlo"}};
+inline constexpr EnumNames<CovarianceMode, 6> kCovarianceModeNames{
+    {"exact", "gauss_newton", "second_order", "stagewise", "monte_carlo", "auto"}};
 
 } // namespace holdfast

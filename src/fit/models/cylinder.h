@@ -3,6 +3,8 @@
 
 #include "model.h"
 
+#include "geometry/safe_gap.h"
+
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 

@@ -3,6 +3,8 @@
 
 #include "model.h"
 
+#include "geometry/safe_gap.h"
+
 #include <cmath>
 
 namespace holdfast { namespace models {
