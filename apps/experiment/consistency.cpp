@@ -260,6 +260,8 @@ addPatchRows(const std::vector<Case>& cases,
                          {"95 %", "unflagged_state_coverage95"},
                          {"flag", "flagged_state_nees_per_dof"},
                          {"95 %", "flagged_state_coverage95"},
+                         {"surface", "surface_nees_per_dof"},
+                         {"95 %", "surface_coverage95"},
                          {"unflagged", "unflagged_nees_per_dof"},
                          {"share", "unflagged_rate"},
                          {"NEES/dof", "nees_per_dof"},
@@ -275,7 +277,8 @@ addPatchRows(const std::vector<Case>& cases,
       "covariance; 1 is right, and a Monte Carlo of this size gives it to about +-" +
       std::to_string(std::sqrt(2.0 / (7.0 * settings.trials))).substr(0, 5) +
       " (one sigma). 95 %: share within the predicted ellipsoid; behind flag and no "
-      "flag: of the state of those fits. unflagged, share: parameters where no flag "
+      "flag: of the state of those fits. surface: normal and height alone. unflagged, "
+      "share: parameters where no flag "
       "is set. sigma: predicted over empirical. bias: largest of any parameter in "
       "sigmas, second-order shift subtracted.");
 }
@@ -331,6 +334,7 @@ checkCloudScenes(const std::vector<Case>& cases,
                          {"frames", "trials"},
                          {"N", "points"},
                          {"judged", "patches"},
+                         {"far", "far"},
                          {"state NEES/dof", "state_nees_per_dof"},
                          {"state 95 %", "state_coverage95"},
                          {"no flag", "unflagged_state_nees_per_dof"},
@@ -348,7 +352,10 @@ checkCloudScenes(const std::vector<Case>& cases,
                          {"failures", "failure_rate"}});
   report.remarks.push_back(
       "Whole clouds: every accepted patch about the fit to the same pixels without "
-      "noise, under the same covariances. surface: normal and height. unflagged: "
+      "noise, under the same covariances. far: those more than ten sigmas off, at "
+      "another minimum where the surface misfits, counted as outside of the ellipsoid, "
+      "but left out of the "
+      "means. surface: normal and height. unflagged: "
       "parameters where no flag is set, flagged: how many have one, switched: share of "
       "those without whose axes came out turned by more than 45 degrees, left out. "
       "other type: the "

@@ -89,6 +89,29 @@ private:
   PointBatch batch_;
 };
 
+void
+add(RobustTally& tally, const NormalizedError& error)
+{
+  constexpr double kFar = 100.0; // NEES/dof
+  if (error.nees_per_dof > kFar)
+    ++tally.far;
+  else
+    holdfast::add(tally.near, error);
+}
+
+void
+add(RobustTally& tally, const RobustTally& other)
+{
+  holdfast::add(tally.near, other.near);
+  tally.far += other.far;
+}
+
+int
+countOf(const RobustTally& tally)
+{
+  return tally.near.count + tally.far;
+}
+
 /// How far the patch is turned about its normal from the reference, rad.
 double
 turnBetween(const Patch& patch, const Patch& reference)
@@ -231,25 +254,39 @@ share(int part, int whole)
 }
 
 Json
+nees(const RobustTally& tally)
+{
+  return value(tally.near, &ErrorTally::nees_per_dof);
+}
+
+/// Those far off are outside.
+Json
+coverage(const RobustTally& tally)
+{
+  const int all = countOf(tally);
+  return all > 0 ? Json(tally.near.coverage95 * tally.near.count / all) : Json();
+}
+
+Json
 rowOf(const CloudCheck& check, const std::string& type, const CloudTally& tally)
 {
-  const int judged = tally.state.count;
-  const auto nees = &ErrorTally::nees_per_dof, within = &ErrorTally::coverage95;
+  const int judged = countOf(tally.state);
   return {{"radius_m", check.radius_m},
           {"type", type},
           {"trials", check.frames},
           {"points", judged > 0 ? Json(tally.points / judged) : Json()},
           {"patches", judged},
-          {"state_nees_per_dof", value(tally.state, nees)},
-          {"state_coverage95", value(tally.state, within)},
-          {"unflagged_state_nees_per_dof", value(tally.unflagged_state, nees)},
-          {"unflagged_state_coverage95", value(tally.unflagged_state, within)},
-          {"flagged_state_nees_per_dof", value(tally.flagged_state, nees)},
-          {"flagged_state_coverage95", value(tally.flagged_state, within)},
-          {"surface_nees_per_dof", value(tally.surface, nees)},
-          {"surface_coverage95", value(tally.surface, within)},
-          {"unflagged_nees_per_dof", value(tally.parameters, nees)},
-          {"unflagged_coverage95", value(tally.parameters, within)},
+          {"far", tally.state.far},
+          {"state_nees_per_dof", nees(tally.state)},
+          {"state_coverage95", coverage(tally.state)},
+          {"unflagged_state_nees_per_dof", nees(tally.unflagged_state)},
+          {"unflagged_state_coverage95", coverage(tally.unflagged_state)},
+          {"flagged_state_nees_per_dof", nees(tally.flagged_state)},
+          {"flagged_state_coverage95", coverage(tally.flagged_state)},
+          {"surface_nees_per_dof", nees(tally.surface)},
+          {"surface_coverage95", coverage(tally.surface)},
+          {"unflagged_nees_per_dof", nees(tally.parameters)},
+          {"unflagged_coverage95", coverage(tally.parameters)},
           {"unflagged_rate", share(judged - tally.flagged, judged)},
           {"flagged", tally.flagged},
           {"switch_rate", share(tally.switched, judged - tally.flagged)},

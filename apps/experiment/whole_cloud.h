@@ -14,12 +14,19 @@
 
 namespace holdfast::app {
 
+/// Of patches, of which some settle at another minimum than the noise-free points do,
+/// hundreds of sigmas away, where a surface misfits: one of them would be the mean.
+struct RobustTally {
+  ErrorTally near; ///< up to ten sigmas off
+  int far = 0;
+};
+
 /// What became of the accepted patches of one type.
 struct CloudTally {
   /// Of the state, and of that without and with a flag.
-  ErrorTally state, unflagged_state, flagged_state;
-  ErrorTally surface; ///< of the normal and the height
-  ErrorTally parameters; ///< of patches without a flag whose axes did not switch
+  RobustTally state, unflagged_state, flagged_state;
+  RobustTally surface; ///< of the normal and the height
+  RobustTally parameters; ///< of patches without a flag whose axes did not switch
   int flagged = 0;
   int switched = 0; ///< without a flag, but turned by more than 45 degrees
   int other_type = 0; ///< that the noise-free points do not have; not judged

@@ -171,6 +171,7 @@ struct Trial {
   ParameterVector error;
   ParameterMatrix covariance;
   NormalizedError parameters, state;
+  StateTallies parts;
   double nonlinearity = 0.0;
   double curvature_in_sigmas = 0.0;
   bool flagged = false;
@@ -248,6 +249,7 @@ private:
     trial.covariance = toTangent(fit.patch, fit.covariance);
     trial.parameters = parameterError(fit, noise_free.patch);
     trial.state = stateError(fit, noise_free.state);
+    addGroupErrors(fit, noise_free.state, trial.parts);
     trial.nonlinearity = fit.nonlinearity;
     trial.curvature_in_sigmas = curvatureInSigmas(fit);
     trial.flagged = fit.flags.any();
@@ -361,6 +363,7 @@ summarizeStates(const std::vector<Trial>& trials,
     if (trial.outcome == Trial::Outcome::Failed)
       continue;
     add(state, trial.state);
+    add(result.parts, trial.parts);
     add(trial.flagged ? result.flagged_state : result.unflagged_state, trial.state);
     addTo(columnOf(trial.nonlinearity, result.by_nonlinearity), trial);
     if (!result.by_curvature.empty())
@@ -429,6 +432,7 @@ pooled(const std::vector<ConsistencyResult>& results)
         tallyOf(one.unflagged_rate * usable, one.unflagged_nees_per_dof, 0.0));
     add(all.unflagged_state, one.unflagged_state);
     add(all.flagged_state, one.flagged_state);
+    add(all.parts, one.parts);
     addColumns(all.by_nonlinearity, one.by_nonlinearity);
     addColumns(all.by_curvature, one.by_curvature);
   }

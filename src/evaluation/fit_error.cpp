@@ -103,6 +103,27 @@ stateError(const FitResult& fit, const PatchState& reference)
                          T * fit.state_covariance * T.transpose());
 }
 
+void
+addGroupErrors(const FitResult& fit, const PatchState& reference, StateTallies& tallies)
+{
+  const StateLayout layout = stateLayoutOf(fit.state.type);
+  const StateMatrix T = freeCoordinates(fit.state.type);
+  const StateVector error = T * stateDifference(fit, reference);
+  const StateMatrix S = T * fit.state_covariance * T.transpose();
+  const auto judge = [&](ErrorTally& tally, Eigen::Index first, Eigen::Index size) {
+    if (size > 0)
+      add(tally,
+          normalizedError(error.segment(first, size),
+                          S.block(first, first, size, size)));
+  };
+  const Eigen::Index k = layout.k(), c = T.rows() - 3, nu = c - 2;
+  judge(tallies.moments, 0, k);
+  judge(tallies.curvature, k, nu - k);
+  judge(tallies.normal, nu, 2);
+  judge(tallies.centre, c, 3);
+  add(tallies.surface, surfaceError(fit, reference));
+}
+
 NormalizedError
 surfaceError(const FitResult& fit, const PatchState& reference)
 {
@@ -138,6 +159,16 @@ add(ErrorTally& tally, const ErrorTally& other)
   const double share = static_cast<double>(other.count) / tally.count;
   tally.nees_per_dof += share * (other.nees_per_dof - tally.nees_per_dof);
   tally.coverage95 += share * (other.coverage95 - tally.coverage95);
+}
+
+void
+add(StateTallies& tallies, const StateTallies& others)
+{
+  add(tallies.moments, others.moments);
+  add(tallies.curvature, others.curvature);
+  add(tallies.normal, others.normal);
+  add(tallies.centre, others.centre);
+  add(tallies.surface, others.surface);
 }
 
 } // namespace holdfast

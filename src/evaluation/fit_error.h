@@ -38,6 +38,12 @@ NormalizedError parameterError(const FitResult& fit, const Patch& reference);
 /// cylinder has two, kxx - kyy and kxy, since its rank is one.
 NormalizedError stateError(const FitResult& fit, const PatchState& reference);
 
+/// Of each group of the state's coordinates alone: [M], [k], [nu], [c]. Those a type
+/// does not have are left out of `tallies`.
+void addGroupErrors(const FitResult& fit,
+                    const PatchState& reference,
+                    StateTallies& tallies);
+
 /// Of the surface alone: of the normal's two angles and the height of the centre along
 /// the normal.
 NormalizedError surfaceError(const FitResult& fit, const PatchState& reference);
@@ -47,5 +53,6 @@ double curvatureInSigmas(const FitResult& fit);
 
 void add(ErrorTally& tally, const NormalizedError& error);
 void add(ErrorTally& tally, const ErrorTally& other);
+void add(StateTallies& tallies, const StateTallies& others);
 
 } // namespace holdfast

@@ -17,6 +17,14 @@ struct ErrorTally {
   double coverage95 = 0.0; ///< share within the 95 % ellipsoid
 };
 
+/// Of parts of the state, each alone. Where neighbours share errors and points are
+/// many, what is a point's own averages away, and the parts move together, along a line
+/// that bends: each can be right and the whole too sure.
+struct StateTallies {
+  ErrorTally moments, curvature, normal, centre;
+  ErrorTally surface; ///< the normal, and the height of the centre along it
+};
+
 /// Trials by a number that their fits report.
 struct ConsistencyColumn {
   double up_to = 0.0; ///< largest such number; the last column has no end
@@ -66,6 +74,7 @@ struct ConsistencyResult {
   double unflagged_rate = 0.0;
   /// Of the state, without and with a flag.
   ErrorTally unflagged_state, flagged_state;
+  StateTallies parts; ///< of the state, over all usable trials
   /// By FitResult::nonlinearity: the sigma of the axis or of the curvature, rescaled.
   std::vector<ConsistencyColumn> by_nonlinearity;
   /// By |kappa| in sigmas; empty where a type has none, or two.
