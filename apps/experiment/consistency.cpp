@@ -252,35 +252,7 @@ addPatchRows(const std::vector<Case>& cases,
       for (const std::string& remark : columnRemarks(name, result))
         report.remarks.push_back(remark);
   }
-  report.columns.insert(report.columns.end(),
-                        {{"N", "points"},
-                         {"state NEES/dof", "state_nees_per_dof"},
-                         {"state 95 %", "state_coverage95"},
-                         {"no flag", "unflagged_state_nees_per_dof"},
-                         {"95 %", "unflagged_state_coverage95"},
-                         {"flag", "flagged_state_nees_per_dof"},
-                         {"95 %", "flagged_state_coverage95"},
-                         {"surface", "surface_nees_per_dof"},
-                         {"95 %", "surface_coverage95"},
-                         {"unflagged", "unflagged_nees_per_dof"},
-                         {"share", "unflagged_rate"},
-                         {"NEES/dof", "nees_per_dof"},
-                         {"about mean", "nees_per_dof_about_mean"},
-                         {"95 %", "coverage95"},
-                         {"sigma min", "sigma_ratio_min"},
-                         {"sigma max", "sigma_ratio_max"},
-                         {"bias", "bias_after_shift_max"},
-                         {"type errors", "type_error_rate"},
-                         {"failures", "failure_rate"}});
-  report.remarks.push_back(
-      "NEES/dof: squared error about the noise-free fit, normalised by the predicted "
-      "covariance; 1 is right, and a Monte Carlo of this size gives it to about +-" +
-      std::to_string(std::sqrt(2.0 / (7.0 * settings.trials))).substr(0, 5) +
-      " (one sigma). 95 %: share within the predicted ellipsoid; behind flag and no "
-      "flag: of the state of those fits. surface: normal and height alone. unflagged, "
-      "share: parameters where no flag "
-      "is set. sigma: predicted over empirical. bias: largest of any parameter in "
-      "sigmas, second-order shift subtracted.");
+  describePatches(settings.trials, !patchSensor(choice).pattern.empty(), report);
 }
 
 void
@@ -329,40 +301,7 @@ checkCloudScenes(const std::vector<Case>& cases,
                  choice,
                  report);
   }
-  report.columns.insert(report.columns.end(),
-                        {{"radius", "radius_m"},
-                         {"frames", "trials"},
-                         {"N", "points"},
-                         {"judged", "patches"},
-                         {"far", "far"},
-                         {"state NEES/dof", "state_nees_per_dof"},
-                         {"state 95 %", "state_coverage95"},
-                         {"no flag", "unflagged_state_nees_per_dof"},
-                         {"95 %", "unflagged_state_coverage95"},
-                         {"flag", "flagged_state_nees_per_dof"},
-                         {"95 %", "flagged_state_coverage95"},
-                         {"surface", "surface_nees_per_dof"},
-                         {"95 %", "surface_coverage95"},
-                         {"unflagged", "unflagged_nees_per_dof"},
-                         {"95 %", "unflagged_coverage95"},
-                         {"flagged", "flagged"},
-                         {"switched", "switch_rate"},
-                         {"other type", "other_type"},
-                         {"no reference", "no_reference"},
-                         {"failures", "failure_rate"}});
-  report.remarks.push_back(
-      "Whole clouds: every accepted patch about the fit to the same pixels without "
-      "noise, under the same covariances. far: those more than ten sigmas off, at "
-      "another minimum where the surface misfits, counted as outside of the ellipsoid, "
-      "but left out of the "
-      "means. surface: normal and height. unflagged: "
-      "parameters where no flag is set, flagged: how many have one, switched: share of "
-      "those without whose axes came out turned by more than 45 degrees, left out. "
-      "other type: the "
-      "noise-free points choose another one; selection of the type is in no "
-      "covariance, and these are not judged. no reference: the noise-free points "
-      "determine no patch. Patches that overlap share errors, so that a frame tells "
-      "less than its number of patches.");
+  describeClouds(report);
 }
 
 Report

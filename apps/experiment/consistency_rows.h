@@ -23,6 +23,12 @@ Json rowOf(const CaseName& name, PatchType type, const ConsistencyResult& result
 std::vector<std::string> columnRemarks(const CaseName& name,
                                        const ConsistencyResult& result);
 
+/// Adds the columns of checks of one patch, and what they mean.
+void describePatches(int trials, bool shared_errors, Report& report);
+
+/// Adds those of whole clouds.
+void describeClouds(Report& report);
+
 /// Null where nothing was counted.
 Json value(const ErrorTally& tally, double ErrorTally::*member);
 
