@@ -2,6 +2,8 @@
 #include "support/patch_batch.h"
 
 #include <holdfast/evaluation/consistency.h>
+#include <holdfast/sensor/stereo_noise_model.h>
+#include <holdfast/simulation/reference_scenes.h>
 
 #include <gtest/gtest.h>
 
@@ -169,6 +171,122 @@ TEST_P(Consistency, ThePapersChoicesAreNearlyRightAboutTheirMean)
   EXPECT_GE(nees, 0.95);
   // The larger of two equal moments is no smooth function of them.
   EXPECT_LE(nees, GetParam().boundary == BoundaryType::Circle ? 1.45 : 1.12);
+}
+
+// The camera of the reference scenes with what a recorded Kinect's pixels share.
+Sensor
+kinectWithPattern()
+{
+  Sensor sensor;
+  sensor.camera = referenceCamera();
+  sensor.noise = std::make_shared<StereoNoiseModel>(StereoNoiseModel::Parameters{});
+  sensor.pattern.waves = {{0.089, 2.1, PatternShape::Exponential},
+                          {0.103, 79.0, PatternShape::Exponential}};
+  return sensor;
+}
+
+// Within [0.95, 1.06] and four standard deviations of a Monte Carlo of this size: the
+// NEES/dof of `dof` coordinates has one of sqrt(2 / (dof n)), coverage one of
+// sqrt(0.95 * 0.05 / n).
+void
+expectHonest(const ErrorTally& tally, int dof, const char* what)
+{
+  if (tally.count == 0)
+    return; // planes have no curvature
+  const double nees = 4.0 * std::sqrt(2.0 / (dof * tally.count));
+  const double coverage = 4.0 * std::sqrt(0.95 * 0.05 / tally.count);
+  EXPECT_GE(tally.nees_per_dof, 0.95 - nees) << what;
+  EXPECT_LE(tally.nees_per_dof, 1.06 + nees) << what;
+  EXPECT_GE(tally.coverage95, 0.93 - coverage) << what;
+  EXPECT_LE(tally.coverage95, 0.96 + coverage) << what;
+}
+
+// To first order: with a tenth of the noise, of which all but what neighbours share
+// averages away over some thousand points.
+TEST_P(Consistency, SharedErrorsAreRightToFirstOrder)
+{
+  constexpr int kDraws = 200;
+  Random random;
+  const Sensor sensor = kinectWithPattern();
+  ReferenceScene scene = robotScene(GetParam(), 1.0, 0.5, 0.6);
+  for (const int stride : {2, 6}) {
+    SCOPED_TRACE("stride " + std::to_string(stride));
+    scene.rays = pixelRays(sensor.camera, stride);
+    ConsistencyOptions options;
+    options.trials = kDraws;
+    options.seed = random.seed();
+    options.noise_scale = 0.1;
+    const ConsistencyResult result =
+        checkConsistency(scene.scene, scene.rays, sensor, options);
+    expectHonest({kDraws, result.state_nees_per_dof, result.state_coverage95},
+                 6,
+                 "state");
+    EXPECT_EQ(result.failure_rate, 0.0);
+  }
+}
+
+// At the full noise the moments of a patch follow its tilt along a line that bends, so
+// that together they are too sure; each alone is right.
+TEST_P(Consistency, NormalAndHeightAreRightForErrorsThatNeighboursShare)
+{
+  constexpr int kDraws = 800;
+  Random random;
+  const ReferenceScene scene = robotScene(GetParam(), 1.0, 0.5, 0.6);
+  ConsistencyOptions options;
+  options.trials = kDraws;
+  options.seed = random.seed();
+  const ConsistencyResult result =
+      checkConsistency(scene.scene, scene.rays, kinectWithPattern(), options);
+  expectHonest(result.parts.normal, 2, "normal");
+  expectHonest(result.parts.surface, 3, "normal and height");
+  EXPECT_EQ(result.failure_rate, 0.0);
+}
+
+TEST_P(Consistency, WithoutAPatternASensorIsItsNoiseModel)
+{
+  const ReferenceScene scene = robotScene(GetParam(), 1.0, 0.5, 0.6);
+  const Sensor sensor = withoutPattern(kinectWithPattern());
+  ConsistencyOptions options;
+  options.trials = 20;
+  const auto of_sensor = checkConsistency(scene.scene, scene.rays, sensor, options);
+  const auto of_model =
+      checkConsistency(scene.scene, scene.rays, *sensor.noise, options);
+  EXPECT_EQ(of_sensor.nees_per_dof, of_model.nees_per_dof);
+  EXPECT_EQ(of_sensor.sigma_ratio, of_model.sigma_ratio);
+}
+
+int
+fitsIn(const std::vector<ConsistencyColumn>& columns)
+{
+  int count = 0;
+  for (const ConsistencyColumn& column : columns)
+    count += column.state.count;
+  return count;
+}
+
+TEST_P(Consistency, EveryUsableFitIsInOneColumnAndWithOrWithoutFlag)
+{
+  Random random;
+  const ReferenceScene scene = randomCloseScene(GetParam(), random.engine());
+  ConsistencyOptions options;
+  options.trials = 30;
+  const auto check = [&](std::uint64_t seed) {
+    options.seed = seed;
+    return run(scene, options);
+  };
+  const ConsistencyResult one = check(random.seed()), two = check(random.seed() + 1);
+  const ConsistencyResult all = pooled({one, two});
+  EXPECT_EQ(all.trials, 60);
+  EXPECT_EQ(all.points, one.points);
+  const int usable = static_cast<int>(std::lround((1.0 - all.failure_rate) * 60.0));
+  EXPECT_EQ(all.unflagged_state.count + all.flagged_state.count, usable);
+  EXPECT_EQ(fitsIn(all.by_nonlinearity), usable);
+  const bool one_curvature = curvatureParameterCount(GetParam().surface) == 1;
+  EXPECT_EQ(fitsIn(all.by_curvature), one_curvature ? usable : 0);
+  EXPECT_NEAR(all.state_nees_per_dof * usable,
+              all.unflagged_state.nees_per_dof * all.unflagged_state.count +
+                  all.flagged_state.nees_per_dof * all.flagged_state.count,
+              1e-9 * usable);
 }
 
 INSTANTIATE_TEST_SUITE_P(AllTypes,

@@ -1,10 +1,14 @@
 // Are the covariances right? Every scene, type and mode against Monte Carlo.
+#include "consistency_rows.h"
 #include "experiment.h"
 #include "scene.h"
+#include "whole_cloud.h"
 
 #include "command_line.h"
+#include "input_options.h"
 
 #include <holdfast/evaluation/consistency.h>
+#include <holdfast/io/config.h>
 #include <holdfast/simulation/reference_scenes.h>
 #include <holdfast/uncertainty/monte_carlo.h>
 
@@ -25,7 +29,13 @@ const std::vector<std::string> kScenes{"table2",
                                        "robot-1.0",
                                        "robot-1.2",
                                        "random",
-                                       "sweep"};
+                                       "sweep",
+                                       "sweep-1.0"};
+
+// Whole frames, of all that is in them; only where asked for by name.
+const std::vector<std::string> kClouds{"rocks", "table", "stairs", "mix"};
+const std::vector<double> kCloudRadii_m{0.03, 0.05, 0.08};
+constexpr int kTrialsPerFrame = 100;
 
 // Options by name: all departures from the paper, none, or all but one.
 struct OptionSet {
@@ -52,16 +62,9 @@ optionSets()
 struct ConsistencyChoice {
   std::vector<std::string> types, modes, scenes, options;
   double noise_scale = 1.0;
+  std::string sensor; // empty: the paper's Kinect
+  bool no_pattern = false;
 };
-
-std::string
-typeName(PatchType type)
-{
-  const std::string surface(surfaceName(type.surface));
-  return type.surface == SurfaceType::Plane ?
-             surface + "_" + std::string(boundaryName(type.boundary)) :
-             surface;
-}
 
 // "random": a distance, tilt and azimuth of its own for every type and seed.
 ReferenceScene
@@ -82,78 +85,6 @@ sceneOf(const std::string& name, PatchType type, std::size_t index, std::uint64_
   return robotScene(type, distance, tilt, uniform(0.0, 6.283));
 }
 
-Json
-byName(const std::vector<double>& values, PatchType type)
-{
-  Json json = Json::object();
-  const std::vector<std::string> names = parameterNames(type);
-  for (std::size_t i = 0; i < values.size(); ++i)
-    json[names[i]] = values[i];
-  return json;
-}
-
-double
-largest(const std::vector<double>& values)
-{
-  double result = 0.0;
-  for (const double value : values)
-    result = std::max(result, std::abs(value));
-  return result;
-}
-
-Json
-columnsJson(const std::vector<ConsistencyColumn>& columns)
-{
-  Json json = Json::array();
-  for (const ConsistencyColumn& column : columns)
-    json.push_back(
-        {{"up_to", std::isfinite(column.up_to) ? Json(column.up_to) : Json()},
-         {"trials", column.trials},
-         {"state_nees_per_dof", column.state_nees_per_dof},
-         {"state_coverage95", column.state_coverage95},
-         {"nees_per_dof", column.nees_per_dof}});
-  return json;
-}
-
-Json
-rowOf(const std::string& scene,
-      PatchType type,
-      CovarianceMode mode,
-      const std::string& options,
-      const ConsistencyResult& result)
-{
-  const auto range =
-      std::minmax_element(result.sigma_ratio.begin(), result.sigma_ratio.end());
-  const bool any = !result.sigma_ratio.empty();
-  return {{"scene", scene},
-          {"type", typeName(type)},
-          {"mode", covarianceModeName(mode)},
-          {"options", options},
-          {"trials", result.trials},
-          {"points", result.points},
-          {"nees_per_dof", result.nees_per_dof},
-          {"nees_per_dof_about_mean", result.nees_per_dof_about_mean},
-          {"coverage95", result.coverage95},
-          {"sigma_ratio_min", any ? Json(*range.first) : Json()},
-          {"sigma_ratio_max", any ? Json(*range.second) : Json()},
-          {"bias_after_shift_max", largest(result.bias_after_shift_sigma)},
-          {"state_nees_per_dof", result.state_nees_per_dof},
-          {"state_coverage95", result.state_coverage95},
-          {"unflagged_nees_per_dof", result.unflagged_nees_per_dof},
-          {"unflagged_rate", result.unflagged_rate},
-          {"by_nonlinearity", columnsJson(result.by_nonlinearity)},
-          {"type_error_rate",
-           isParaboloid(type.surface) || (type.surface == SurfaceType::Plane &&
-                                          type.boundary == BoundaryType::Ellipse) ?
-               Json(result.type_error_rate) :
-               Json()},
-          {"sigma_ratio", byName(result.sigma_ratio, type)},
-          {"bias_sigma", byName(result.bias_sigma, type)},
-          {"bias_after_shift_sigma", byName(result.bias_after_shift_sigma, type)},
-          {"switch_rate", result.switch_rate},
-          {"failure_rate", result.failure_rate}};
-}
-
 bool
 chosen(const std::vector<std::string>& choice, const std::string& name)
 {
@@ -161,6 +92,15 @@ chosen(const std::vector<std::string>& choice, const std::string& name)
          std::any_of(choice.begin(), choice.end(), [&name](const std::string& chosen) {
            return isSameName(chosen, name);
          });
+}
+
+// Without a choice only the default is.
+bool
+isWanted(const std::vector<std::string>& choice,
+         const std::string& by_default,
+         const std::string& name)
+{
+  return choice.empty() ? name == by_default : chosen(choice, name);
 }
 
 // One row to compute.
@@ -175,10 +115,6 @@ struct Case {
 std::vector<Case>
 casesOf(const ConsistencyChoice& choice)
 {
-  const std::vector<std::string> modes =
-      choice.modes.empty() ? std::vector<std::string>{"exact"} : choice.modes;
-  const std::vector<std::string> options =
-      choice.options.empty() ? std::vector<std::string>{"default"} : choice.options;
   std::vector<Case> cases;
   for (const std::string& scene : kScenes)
     for (std::size_t type = 0; type < kPatchTypes.size(); ++type)
@@ -186,26 +122,51 @@ casesOf(const ConsistencyChoice& choice)
         for (const OptionSet& set : optionSets())
           if (chosen(choice.scenes, scene) &&
               chosen(choice.types, typeName(kPatchTypes[type])) &&
-              chosen(modes, std::string(covarianceModeName(mode))) &&
-              chosen(options, set.name))
+              isWanted(choice.modes, "exact", std::string(covarianceModeName(mode))) &&
+              isWanted(choice.options, "default", set.name))
             cases.push_back({scene, type, mode, set});
   return cases;
+}
+
+// Whole clouds, whose types are what is in them.
+std::vector<Case>
+cloudCasesOf(const ConsistencyChoice& choice)
+{
+  std::vector<Case> cases;
+  if (choice.scenes.empty())
+    return cases;
+  for (const std::string& scene : kClouds)
+    for (const CovarianceMode mode : kAllCovarianceModes)
+      for (const OptionSet& set : optionSets())
+        if (chosen(choice.scenes, scene) &&
+            isWanted(choice.modes, "exact", std::string(covarianceModeName(mode))) &&
+            isWanted(choice.options, "default", set.name))
+          cases.push_back({scene, 0, mode, set});
+  return cases;
+}
+
+bool
+isSweep(const std::string& scene)
+{
+  return scene.rfind("sweep", 0) == 0;
 }
 
 // Many views nobody chose, a few trials each. Views in which the points do not
 // determine the patch even without noise are drawn again.
 ConsistencyResult
-sweep(PatchType type,
+sweep(const std::string& name,
       std::size_t type_index,
-      const NoiseModel& noise,
+      const Sensor& sensor,
       const ConsistencyOptions& options)
 {
+  const PatchType type = kPatchTypes[type_index];
   constexpr int kTrialsPerView = 20;
   std::mt19937_64 generator = trialGenerator(options.seed, type_index);
   std::vector<ConsistencyResult> views;
   const int wanted = std::max(1, options.trials / kTrialsPerView);
   while (static_cast<int>(views.size()) < wanted) {
-    const ReferenceScene scene = randomScene(type, generator);
+    const ReferenceScene scene = name == "sweep" ? randomScene(type, generator) :
+                                                   randomCloseScene(type, generator);
     ConsistencyOptions few = options;
     few.trials = kTrialsPerView;
     few.seed = generator();
@@ -213,7 +174,7 @@ sweep(PatchType type,
     if (options.progress)
       options.progress(static_cast<int>(views.size()), wanted);
     try {
-      views.push_back(checkConsistency(scene.scene, scene.rays, noise, few));
+      views.push_back(checkConsistency(scene.scene, scene.rays, sensor, few));
     }
     catch (const std::invalid_argument&) {
       continue;
@@ -222,60 +183,204 @@ sweep(PatchType type,
   return pooled(views);
 }
 
-Report
-runConsistency(const ConsistencyChoice& choice, const ExperimentSettings& settings)
+// Of the scenes that show one patch, whose views are those of the reference camera.
+Sensor
+patchSensor(const ConsistencyChoice& choice)
 {
-  const std::vector<Case> cases = casesOf(choice);
-  const NoiseModel::ConstPtr noise = kinectNoise();
-  Report report;
+  Sensor sensor;
+  sensor.name = "kinect";
+  sensor.noise = kinectNoise();
+  if (!choice.sensor.empty())
+    sensor = loadSensorOption(choice.sensor);
+  sensor = withCamera(sensor, referenceCamera());
+  return choice.no_pattern ? withoutPattern(sensor) : sensor;
+}
+
+// The same with a camera of its own.
+Sensor
+cloudSensor(const ConsistencyChoice& choice)
+{
+  if (choice.sensor.empty())
+    return patchSensor(choice);
+  const Sensor sensor = loadSensorOption(choice.sensor);
+  return choice.no_pattern ? withoutPattern(sensor) : sensor;
+}
+
+ConsistencyResult
+checkCase(const Case& one,
+          const ConsistencyChoice& choice,
+          const ExperimentSettings& settings)
+{
+  ConsistencyOptions options;
+  options.fit = one.options.fit;
+  options.mode = one.mode;
+  options.trials = settings.trials;
+  options.seed = settings.seed;
+  options.threads = settings.threads;
+  options.noise_scale = choice.noise_scale;
+  options.count_type_errors = true;
+  options.progress = settings.progress;
+  const Sensor sensor = patchSensor(choice);
+  if (isSweep(one.scene))
+    return sweep(one.scene, one.type_index, sensor, options);
+  const ReferenceScene scene =
+      sceneOf(one.scene, kPatchTypes[one.type_index], one.type_index, settings.seed);
+  return checkConsistency(scene.scene, scene.rays, sensor, options);
+}
+
+void
+addPatchRows(const std::vector<Case>& cases,
+             const ConsistencyChoice& choice,
+             const ExperimentSettings& settings,
+             Report& report)
+{
+  if (cases.empty())
+    return;
   for (std::size_t i = 0; i < cases.size(); ++i) {
     const Case& one = cases[i];
-    const PatchType type = kPatchTypes[one.type_index];
-    ConsistencyOptions options;
-    options.fit = one.options.fit;
-    options.mode = one.mode;
-    options.trials = settings.trials;
+    ExperimentSettings stage = settings;
+    stage.progress = stageProgress(settings.progress,
+                                   static_cast<int>(i),
+                                   static_cast<int>(cases.size()));
+    const ConsistencyResult result = checkCase(one, choice, stage);
+    const CaseName name{one.scene,
+                        typeName(kPatchTypes[one.type_index]),
+                        std::string(covarianceModeName(one.mode)),
+                        one.options.name};
+    report.rows.push_back(rowOf(name, kPatchTypes[one.type_index], result));
+    if (isSweep(one.scene))
+      for (const std::string& remark : columnRemarks(name, result))
+        report.remarks.push_back(remark);
+  }
+  describePatches(settings.trials, !patchSensor(choice).pattern.empty(), report);
+}
+
+void
+addCloudRows(const std::string& scene,
+             const Case& one,
+             const std::vector<CloudCheck>& checks,
+             const ConsistencyChoice& choice,
+             Report& report)
+{
+  for (const CloudCheck& check : checks)
+    for (const Json& of_type : rowsOf(check)) {
+      if (!choice.types.empty() && !chosen(choice.types, of_type["type"]))
+        continue;
+      Json row = {{"scene", scene},
+                  {"type", of_type["type"]},
+                  {"mode", covarianceModeName(one.mode)},
+                  {"options", one.options.name}};
+      row.update(of_type);
+      report.rows.push_back(std::move(row));
+    }
+}
+
+void
+checkCloudScenes(const std::vector<Case>& cases,
+                 const ConsistencyChoice& choice,
+                 const ExperimentSettings& settings,
+                 Report& report)
+{
+  if (cases.empty())
+    return;
+  const Sensor sensor = cloudSensor(choice);
+  for (std::size_t i = 0; i < cases.size(); ++i) {
+    CloudCheckOptions options;
+    options.scene = cases[i].scene;
+    options.fit = cases[i].options.fit;
+    options.mode = cases[i].mode;
+    options.frames = std::max(1, settings.trials / kTrialsPerFrame);
     options.seed = settings.seed;
     options.threads = settings.threads;
-    options.noise_scale = choice.noise_scale;
-    options.count_type_errors = true;
     options.progress = stageProgress(settings.progress,
                                      static_cast<int>(i),
                                      static_cast<int>(cases.size()));
-    const auto check = [&] {
-      if (one.scene == "sweep")
-        return sweep(type, one.type_index, *noise, options);
-      const ReferenceScene scene =
-          sceneOf(one.scene, type, one.type_index, settings.seed);
-      return checkConsistency(scene.scene, scene.rays, *noise, options);
-    };
-    report.rows.push_back(rowOf(one.scene, type, one.mode, one.options.name, check()));
+    addCloudRows(cases[i].scene,
+                 cases[i],
+                 checkClouds(kCloudRadii_m, sensor, options),
+                 choice,
+                 report);
   }
+  describeClouds(report);
+}
+
+Report
+runConsistency(const ConsistencyChoice& choice, const ExperimentSettings& settings)
+{
+  const std::vector<Case> patches = casesOf(choice), clouds = cloudCasesOf(choice);
+  if (!clouds.empty() && choice.noise_scale != 1.0)
+    throw CLI::ValidationError("--noise-scale", "goes with scenes of one patch only");
+  Report report;
   report.columns = {{"scene", "scene"},
                     {"type", "type"},
                     {"mode", "mode"},
-                    {"options", "options"},
-                    {"N", "points"},
-                    {"state NEES/dof", "state_nees_per_dof"},
-                    {"state 95 %", "state_coverage95"},
-                    {"unflagged", "unflagged_nees_per_dof"},
-                    {"share", "unflagged_rate"},
-                    {"NEES/dof", "nees_per_dof"},
-                    {"about mean", "nees_per_dof_about_mean"},
-                    {"95 %", "coverage95"},
-                    {"sigma min", "sigma_ratio_min"},
-                    {"sigma max", "sigma_ratio_max"},
-                    {"bias", "bias_after_shift_max"},
-                    {"type errors", "type_error_rate"},
-                    {"failures", "failure_rate"}};
-  report.remarks = {
-      "NEES/dof: squared error about the noise-free fit, normalised by the predicted "
-      "covariance; 1 is right, and a Monte Carlo of this size gives it to about +-" +
-      std::to_string(std::sqrt(2.0 / (7.0 * settings.trials))).substr(0, 5) +
-      " (one sigma). 95 %: share within the predicted ellipsoid. sigma: predicted over "
-      "empirical. bias: largest of any parameter in sigmas, second-order shift "
-      "subtracted."};
+                    {"options", "options"}};
+  addPatchRows(patches, choice, settings, report);
+  checkCloudScenes(clouds, choice, settings, report);
+  completeRows(report.rows);
   return report;
+}
+
+void
+addChoices(CLI::App& command, ConsistencyChoice& choice)
+{
+  std::vector<std::string> types, modes, options, scenes = kScenes;
+  for (const PatchType type : kPatchTypes)
+    types.push_back(typeName(type));
+  for (const CovarianceMode mode : kAllCovarianceModes)
+    modes.push_back(std::string(covarianceModeName(mode)));
+  for (const OptionSet& set : optionSets())
+    options.push_back(set.name);
+  scenes.insert(scenes.end(), kClouds.begin(), kClouds.end());
+  const auto add = [&](const std::string& name,
+                       std::vector<std::string>& values,
+                       const std::vector<std::string>& allowed,
+                       const std::string& description) {
+    command.add_option(name, values, description)
+        ->check(oneOf(allowed, [allowed](const std::string& word) {
+          return chosen(allowed, word);
+        }));
+  };
+  add("--type", choice.types, types, "Only these patch types");
+  add("--mode", choice.modes, modes, "Covariance modes (default: exact)");
+  add("--scene",
+      choice.scenes,
+      scenes,
+      "Only these scenes (default: all of one patch, the first seven)");
+  add("--options", choice.options, options, "Option sets (default: default)");
+  command.add_flag_callback(
+      "--paper",
+      [&choice] { choice.options = {"paper"}; },
+      "The paper's choices, as --options paper");
+}
+
+std::string
+joinedSensors()
+{
+  std::string text;
+  for (const std::string& name : listSensors())
+    text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+void
+addNoiseOptions(CLI::App& command, ConsistencyChoice& choice)
+{
+  command
+      .add_option("--noise-scale",
+                  choice.noise_scale,
+                  "Factor on the noise's sigmas; of scenes of one patch")
+      ->check(CLI::PositiveNumber);
+  command
+      .add_option("--sensor",
+                  choice.sensor,
+                  "Draw the noise of this sensor and what neighbouring pixels share of "
+                  "it (its pattern), and fit with both; a YAML file or one of " +
+                      joinedSensors() + " (default: the paper's Kinect, no pattern)")
+      ->type_name("NAME|FILE");
+  command.add_flag("--no-pattern",
+                   choice.no_pattern,
+                   "Draw and take the errors of neighbouring pixels as independent");
 }
 
 } // namespace
@@ -287,39 +392,13 @@ consistencyExperiment()
   experiment.name = "consistency";
   experiment.former_name = "calibration";
   experiment.summary = "Predicted covariances against Monte Carlo on known scenes";
-  experiment.trials_meaning = "noise draws per row";
+  experiment.trials_meaning =
+      "noise draws per row; of whole clouds one frame for each hundred";
   experiment.default_trials = 3000;
   experiment.prepare = [](CLI::App& command) -> ExperimentRun {
     const auto choice = std::make_shared<ConsistencyChoice>();
-    std::vector<std::string> types, modes, options;
-    for (const PatchType type : kPatchTypes)
-      types.push_back(typeName(type));
-    for (const CovarianceMode mode : kAllCovarianceModes)
-      modes.push_back(std::string(covarianceModeName(mode)));
-    for (const OptionSet& set : optionSets())
-      options.push_back(set.name);
-    const auto add = [&](const std::string& name,
-                         std::vector<std::string>& values,
-                         const std::vector<std::string>& allowed,
-                         const std::string& description) {
-      command.add_option(name, values, description)
-          ->check(oneOf(allowed, [allowed](const std::string& word) {
-            return chosen(allowed, word);
-          }));
-    };
-    add("--type", choice->types, types, "Only these patch types");
-    add("--mode", choice->modes, modes, "Covariance modes (default: exact)");
-    add("--scene", choice->scenes, kScenes, "Only these scenes");
-    add("--options", choice->options, options, "Option sets (default: default)");
-    command.add_flag_callback(
-        "--paper",
-        [choice] { choice->options = {"paper"}; },
-        "The paper's choices, as --options paper");
-    command
-        .add_option("--noise-scale",
-                    choice->noise_scale,
-                    "Factor on the noise's sigmas")
-        ->check(CLI::PositiveNumber);
+    addChoices(command, *choice);
+    addNoiseOptions(command, *choice);
     return [choice](const ExperimentSettings& settings) {
       return runConsistency(*choice, settings);
     };

@@ -6,6 +6,15 @@
 
 namespace holdfast::app {
 
+std::string
+typeName(PatchType type)
+{
+  const std::string surface(surfaceName(type.surface));
+  return type.surface == SurfaceType::Plane ?
+             surface + "_" + std::string(boundaryName(type.boundary)) :
+             surface;
+}
+
 NoiseModel::ConstPtr
 kinectNoise()
 {

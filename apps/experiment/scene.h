@@ -13,6 +13,9 @@
 
 namespace holdfast::app {
 
+/// "sphere", "plane_quad", ...: the surface, of planes with the boundary.
+std::string typeName(PatchType type);
+
 /// The noise of the paper's Kinect: 0.35 px, 0.17 px of disparity, f = 580 px.
 NoiseModel::ConstPtr kinectNoise();
 

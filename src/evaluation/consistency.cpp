@@ -1,17 +1,16 @@
+#include "evaluation/fit_error.h"
 #include "parallel/parallel_for.h"
 
 #include <holdfast/evaluation/consistency.h>
 #include <holdfast/fit/reference_points.h>
 #include <holdfast/geometry/gaussian.h>
-#include <holdfast/geometry/rotation.h>
 #include <holdfast/uncertainty/monte_carlo.h>
-
-#include <boost/math/distributions/chi_squared.hpp>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <stdexcept>
 
 namespace holdfast {
@@ -22,145 +21,186 @@ struct TruePoints {
   Pose sensor_pose;
   std::vector<Eigen::Vector3d> points;
   std::vector<Eigen::Matrix3d> roots;
+  // What neighbours share: over a rectangle of pixels, of which the points are those,
+  // and how each moves with it. Null: nothing.
+  std::shared_ptr<const PatternField> field;
+  std::vector<std::size_t> pixels;
+  std::vector<Eigen::Vector3d> directions;
 };
+
+// The part of the image that the first patch fills, with nothing else in it.
+RangeImage
+cropped(const RangeImage& image)
+{
+  int low_u = image.width, low_v = image.height, high_u = -1, high_v = -1;
+  for (int v = 0; v < image.height; ++v)
+    for (int u = 0; u < image.width; ++u)
+      if (image.hits[static_cast<std::size_t>(v * image.width + u)] == 0) {
+        low_u = std::min(low_u, u);
+        high_u = std::max(high_u, u);
+        low_v = std::min(low_v, v);
+        high_v = std::max(high_v, v);
+      }
+  RangeImage part;
+  part.sensor_pose = image.sensor_pose;
+  part.width = std::max(0, high_u - low_u + 1);
+  part.height = std::max(0, high_v - low_v + 1);
+  for (int v = low_v; v <= high_v; ++v)
+    for (int u = low_u; u <= high_u; ++u) {
+      const auto i = static_cast<std::size_t>(v * image.width + u);
+      part.directions.push_back(image.directions[i]);
+      part.hits.push_back(image.hits[i] == 0 ? 0 : -1);
+      part.truth.push_back(image.truth[i]);
+    }
+  part.points = part.truth;
+  part.covariances.assign(part.truth.size(), Eigen::Matrix3d::Zero());
+  part.roots = part.covariances;
+  return part;
+}
 
 TruePoints
 truePoints(const Scene& scene,
            const RayGrid& rays,
-           const NoiseModel& noise,
+           const Sensor& sensor,
            double noise_scale)
 {
-  RangeImage image = castRays(scene, rays);
-  attachNoise(image, noise, noise_scale);
+  RangeImage image = cropped(castRays(scene, rays));
   TruePoints truth;
   truth.sensor_pose = image.sensor_pose;
+  if (image.truth.empty())
+    return truth;
+  attachNoise(image, sensor, noise_scale);
+  truth.field = image.pattern;
   const Eigen::Matrix3d to_camera = image.sensor_pose.R.transpose();
-  for (std::size_t i = 0; i < image.truth.size(); ++i)
-    if (image.hits[i] == 0) {
-      truth.points.push_back(image.sensor_pose.toLocal(image.truth[i]));
-      truth.roots.push_back(to_camera * image.roots[i]);
-    }
+  for (std::size_t i = 0; i < image.truth.size(); ++i) {
+    if (image.hits[i] != 0)
+      continue;
+    truth.points.push_back(image.sensor_pose.toLocal(image.truth[i]));
+    truth.roots.push_back(to_camera * image.roots[i]);
+    truth.pixels.push_back(i);
+    if (truth.field)
+      truth.directions.push_back(to_camera * image.pattern_directions[i]);
+  }
   return truth;
 }
 
-// Fills the batch in the world frame from measured points in the camera frame, with
-// covariances from the model, at the surface if asked.
+// Draws the points with noise, camera frame.
 void
-fillBatch(const std::vector<Eigen::Vector3d>& points,
-          const TruePoints& truth,
-          const NoiseModel& noise,
-          double noise_scale,
-          bool noise_at_surface,
-          PointBatch& camera,
-          PointBatch& batch)
+drawPoints(const TruePoints& truth,
+           std::mt19937_64& generator,
+           std::vector<Eigen::Vector3d>& points)
 {
-  camera.clear(Eigen::Vector3d::Zero());
-  for (const Eigen::Vector3d& q : points)
-    camera.add(q, Eigen::Matrix3d::Zero());
-  if (noise_at_surface)
-    computeReferencePoints(camera, Eigen::Vector3d::Zero());
-  const auto first = noise_at_surface ? PointBatch::RX : PointBatch::X;
-  const Eigen::Matrix3d& R = truth.sensor_pose.R;
-  batch.clear(truth.sensor_pose.toWorld(truth.points.front()), truth.sensor_pose.c);
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    Eigen::Vector3d at;
-    for (int k = 0; k < 3; ++k)
-      at[k] = camera.channel(static_cast<PointBatch::Channel>(first + k))[i];
-    batch.add(truth.sensor_pose.toWorld(points[i]),
-              noise_scale * noise_scale * rotateCovariance(R, noise.covariance(at)));
+  drawNoise(truth.points, truth.roots, generator, points);
+  if (!truth.field)
+    return;
+  std::vector<double> field;
+  truth.field->draw(generator, field);
+  for (std::size_t i = 0; i < points.size(); ++i)
+    points[i] += field[truth.pixels[i]] * truth.directions[i];
+}
+
+// Fills batches in the world frame from measured points in the camera frame, with
+// covariances from the sensor's model, at the surface if asked, and its pattern.
+class BatchFiller {
+public:
+  BatchFiller(const Pose& sensor_pose,
+              const Sensor& sensor,
+              double noise_scale,
+              bool noise_at_surface)
+  : sensor_pose_(sensor_pose)
+  , sensor_(sensor)
+  , noise_scale_(noise_scale)
+  , noise_at_surface_(noise_at_surface)
+  {
+    if (!sensor.pattern.empty())
+      pattern_ = std::make_shared<const CorrelatedNoise>(sensor.pattern);
   }
-}
 
-// Error of a patch in the tangent space [d | k | delta | c] of the reference.
-ParameterVector
-tangentError(const Patch& patch, const Patch& reference)
-{
-  const ParameterLayout layout = layoutOf(reference.type);
-  ParameterVector error = pack(patch) - pack(reference);
-  const Eigen::Vector3d delta =
-      logMap(expMap(reference.r).transpose() * expMap(patch.r));
-  error.segment(layout.r(), layout.r_count) = delta.head(layout.r_count);
-  return error;
-}
+  void fill(const std::vector<Eigen::Vector3d>& points, PointBatch& batch) const
+  {
+    PointBatch camera;
+    camera.clear(Eigen::Vector3d::Zero());
+    for (const Eigen::Vector3d& q : points)
+      camera.add(q, Eigen::Matrix3d::Zero());
+    if (noise_at_surface_)
+      computeReferencePoints(camera, Eigen::Vector3d::Zero());
+    const auto first = noise_at_surface_ ? PointBatch::RX : PointBatch::X;
+    batch.clear(sensor_pose_.toWorld(points.front()), sensor_pose_.c);
+    batch.setPattern(pattern_);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      Eigen::Vector3d at;
+      for (int k = 0; k < 3; ++k)
+        at[k] = camera.channel(static_cast<PointBatch::Channel>(first + k))[i];
+      batch.add(sensor_pose_.toWorld(points[i]),
+                noise_scale_ * noise_scale_ *
+                    rotateCovariance(sensor_pose_.R, sensor_.noise->covariance(at)));
+      if (pattern_)
+        share(points[i], at, i, batch);
+    }
+  }
 
-// [d | k | r | c] shift to the tangent space.
-ParameterVector
-tangentShift(const Patch& patch, const ParameterVector& shift)
-{
-  return tangentJacobian(patch) * shift;
-}
+private:
+  // \param at where the model is evaluated.
+  void share(const Eigen::Vector3d& point,
+             const Eigen::Vector3d& at,
+             std::size_t i,
+             PointBatch& batch) const
+  {
+    const Eigen::Vector2d pixel = sensor_.camera.project(point);
+    batch.channel(PointBatch::U)[i] = pixel.x();
+    batch.channel(PointBatch::V)[i] = pixel.y();
+    const Eigen::Vector3d direction =
+        noise_scale_ * sensor_pose_.R * sensor_.noise->patternDirection(at);
+    for (int k = 0; k < 3; ++k)
+      batch.channel(static_cast<PointBatch::Channel>(PointBatch::EX + k))[i] =
+          direction[k];
+  }
+
+  const Pose& sensor_pose_;
+  const Sensor& sensor_;
+  double noise_scale_;
+  bool noise_at_surface_;
+  std::shared_ptr<const CorrelatedNoise> pattern_;
+};
 
 struct Trial {
   enum class Outcome { Used, Switched, Failed };
   Outcome outcome = Outcome::Failed;
   bool wrong_type = false;
-  // Tangent space. The region of confidence about the estimate plus the second-order
-  // shift, where there is one, lies off the reference by error + shift.
-  ParameterVector error, shift;
+  // Tangent space [d | k | delta | c].
+  ParameterVector error;
   ParameterMatrix covariance;
-  // The same of the state, about the estimate and in its frame.
-  StateVector state_error;
-  StateMatrix state_covariance;
+  NormalizedError parameters, state;
+  StateTallies parts;
   double nonlinearity = 0.0;
+  double curvature_in_sigmas = 0.0;
   bool flagged = false;
 };
 
-constexpr std::array kColumnEdges{0.01,
-                                  0.03,
-                                  0.1,
-                                  0.3,
-                                  1.0,
-                                  3.0,
-                                  std::numeric_limits<double>::infinity()};
+constexpr double kNoEnd = std::numeric_limits<double>::infinity();
+constexpr std::array kNonlinearityEdges{0.01, 0.03, 0.1, 0.3, 1.0, 3.0, kNoEnd};
+constexpr std::array kCurvatureEdges{3.0, 6.0, 12.0, 20.0, 50.0, kNoEnd};
 
-// x^T S^+ x and the rank of S.
-struct Mahalanobis {
-  double squared = 0.0;
-  int rank = 0;
-};
-
-Mahalanobis
-mahalanobis(const ParameterVector& x, const ParameterMatrix& S)
+template <std::size_t n>
+std::vector<ConsistencyColumn>
+emptyColumns(const std::array<double, n>& edges)
 {
-  // Parameters differ in unit: scale to correlations, so that one tolerance decides.
-  constexpr double kNull = 1e-9;
-  const ParameterVector inverse = S.diagonal().cwiseSqrt().cwiseInverse();
-  const ParameterMatrix correlation = inverse.asDiagonal() * S * inverse.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<ParameterMatrix> solver(correlation);
-  const ParameterVector y = solver.eigenvectors().transpose() * inverse.cwiseProduct(x);
-  Mahalanobis result;
-  for (int i = 0; i < y.size(); ++i)
-    if (solver.eigenvalues()[i] > kNull) {
-      result.squared += y[i] * y[i] / solver.eigenvalues()[i];
-      ++result.rank;
-    }
-  return result;
-}
-
-// Squared error over the rank of its covariance, and whether the 95 % ellipsoid has it.
-struct Normalized {
-  double nees_per_dof = 0.0;
-  bool within = false;
-};
-
-Normalized
-normalized(const ParameterVector& error, const ParameterMatrix& covariance)
-{
-  const Mahalanobis m = mahalanobis(error, covariance);
-  const boost::math::chi_squared chi2(m.rank);
-  return {m.squared / m.rank, m.squared <= boost::math::quantile(chi2, 0.95)};
+  std::vector<ConsistencyColumn> columns;
+  for (const double edge : edges)
+    columns.push_back({edge, {}, {}});
+  return columns;
 }
 
 class TrialRunner {
 public:
   TrialRunner(const TruePoints& truth,
-              const NoiseModel& noise,
+              const Sensor& sensor,
               const FitOptions& fit,
               PatchType type,
               const ConsistencyOptions& options)
   : truth_(truth)
-  , noise_(noise)
   , options_(options)
+  , filler_(truth.sensor_pose, sensor, options.noise_scale, fit.noise_at_surface)
   , estimator_(fit, options.mode)
   , free_estimator_(freeOptions(fit), CovarianceMode::GaussNewton)
   , type_(type)
@@ -169,8 +209,8 @@ public:
   // The fit to the points without noise: their scatter has none to subtract.
   FitResult noiseFree(CovarianceMode mode, const FitOptions& fit) const
   {
-    PointBatch camera, batch;
-    fill(truth_.points, camera, batch);
+    PointBatch batch;
+    filler_.fill(truth_.points, batch);
     FitOptions options = fit;
     options.debias_scatter = false;
     return PatchEstimator(options, mode).estimate(batch);
@@ -178,36 +218,19 @@ public:
 
   Trial run(int index, const FitResult& noise_free) const
   {
-    const Patch& reference = noise_free.patch;
-    // A turn of more than this is a change of representation, not an error.
-    constexpr double kSwitched = 0.785;
     std::mt19937_64 generator =
         trialGenerator(options_.seed, static_cast<std::uint64_t>(index));
-    PointBatch camera, batch;
+    PointBatch batch;
     std::vector<Eigen::Vector3d> points;
-    drawNoise(truth_.points, truth_.roots, generator, points);
-    fill(points, camera, batch);
+    drawPoints(truth_, generator, points);
+    filler_.fill(points, batch);
     const FitResult fit = estimator_.estimate(batch);
     Trial trial;
     if (options_.count_type_errors)
       trial.wrong_type =
           free_estimator_.estimate(batch).patch.type.surface != type_.surface;
-    if (!isUsable(fit.status))
-      return trial;
-    trial.error = tangentError(fit.patch, reference);
-    trial.shift = fit.mean_shift.size() > 0 ? tangentShift(fit.patch, fit.mean_shift) :
-                                              ParameterVector::Zero(trial.error.size());
-    trial.covariance = toTangent(fit.patch, fit.covariance);
-    trial.state_error = -difference(noise_free.state, fit.state);
-    if (fit.state_mean_shift.size() > 0)
-      trial.state_error += fit.state_mean_shift;
-    trial.state_covariance = fit.state_covariance;
-    trial.nonlinearity = fit.nonlinearity;
-    trial.flagged = fit.flags.any();
-    const ParameterLayout layout = layoutOf(type_);
-    const double turn = layout.r_count == 3 ? trial.error[layout.r() + 2] : 0.0;
-    trial.outcome =
-        std::abs(turn) > kSwitched ? Trial::Outcome::Switched : Trial::Outcome::Used;
+    if (isUsable(fit.status))
+      judge(fit, noise_free, trial);
     return trial;
   }
 
@@ -218,22 +241,27 @@ private:
     return fit;
   }
 
-  void fill(const std::vector<Eigen::Vector3d>& points,
-            PointBatch& camera,
-            PointBatch& batch) const
+  void judge(const FitResult& fit, const FitResult& noise_free, Trial& trial) const
   {
-    fillBatch(points,
-              truth_,
-              noise_,
-              options_.noise_scale,
-              options_.fit.noise_at_surface,
-              camera,
-              batch);
+    // A turn of more than this is a change of representation, not an error.
+    constexpr double kSwitched = 0.785;
+    trial.error = tangentError(fit.patch, noise_free.patch);
+    trial.covariance = toTangent(fit.patch, fit.covariance);
+    trial.parameters = parameterError(fit, noise_free.patch);
+    trial.state = stateError(fit, noise_free.state);
+    addGroupErrors(fit, noise_free.state, trial.parts);
+    trial.nonlinearity = fit.nonlinearity;
+    trial.curvature_in_sigmas = curvatureInSigmas(fit);
+    trial.flagged = fit.flags.any();
+    const ParameterLayout layout = layoutOf(type_);
+    const double turn = layout.r_count == 3 ? trial.error[layout.r() + 2] : 0.0;
+    trial.outcome =
+        std::abs(turn) > kSwitched ? Trial::Outcome::Switched : Trial::Outcome::Used;
   }
 
   const TruePoints& truth_;
-  const NoiseModel& noise_;
   const ConsistencyOptions& options_;
+  BatchFiller filler_;
   PatchEstimator estimator_;
   PatchEstimator free_estimator_;
   PatchType type_;
@@ -293,12 +321,10 @@ summarize(const std::vector<Trial>& trials, ConsistencyResult& result)
     if (trial.outcome != Trial::Outcome::Used)
       continue;
     variance += (trial.error - mean).cwiseAbs2();
-    const Normalized about_fit =
-        normalized(trial.error + trial.shift, trial.covariance);
     const Mahalanobis about_mean = mahalanobis(trial.error - mean, trial.covariance);
-    result.nees_per_dof += about_fit.nees_per_dof / used;
+    result.nees_per_dof += trial.parameters.nees_per_dof / used;
     result.nees_per_dof_about_mean += about_mean.squared / about_mean.rank / used;
-    result.coverage95 += static_cast<double>(about_fit.within) / used;
+    result.coverage95 += static_cast<double>(trial.parameters.within95) / used;
   }
   variance /= used - 1;
   const ParameterVector sigma = variance.cwiseSqrt();
@@ -307,30 +333,21 @@ summarize(const std::vector<Trial>& trials, ConsistencyResult& result)
   result.bias_after_shift_sigma = result.bias_sigma;
 }
 
-// A running mean.
-void
-average(double& mean, double value, int count)
+ConsistencyColumn&
+columnOf(double value, std::vector<ConsistencyColumn>& columns)
 {
-  mean += (value - mean) / count;
+  for (ConsistencyColumn& column : columns)
+    if (value <= column.up_to)
+      return column;
+  return columns.back(); // a NaN
 }
 
-// The curvature matrix of a cylinder has rank one: what its entries have beside their
-// two free numbers, kxx - kyy and kxy, is no coordinate.
-StateMatrix
-freeCoordinates(PatchType type)
+void
+addTo(ConsistencyColumn& column, const Trial& trial)
 {
-  const StateLayout layout = stateLayoutOf(type);
-  StateMatrix T = StateMatrix::Identity(layout.size(), layout.size());
-  if (type.surface != SurfaceType::CircularCylinder)
-    return T;
-  const int k = layout.k(), rest = layout.size() - k - 3;
-  StateMatrix free = StateMatrix::Zero(layout.size() - 1, layout.size());
-  free.topLeftCorner(k, k).setIdentity();
-  free(k, k) = 1.0;
-  free(k, k + 2) = -1.0;
-  free(k + 1, k + 1) = 1.0;
-  free.bottomRightCorner(rest, rest).setIdentity();
-  return free;
+  add(column.state, trial.state);
+  if (trial.outcome == Trial::Outcome::Used)
+    add(column.parameters, trial.parameters);
 }
 
 void
@@ -338,36 +355,60 @@ summarizeStates(const std::vector<Trial>& trials,
                 PatchType type,
                 ConsistencyResult& result)
 {
-  for (const double edge : kColumnEdges)
-    result.by_nonlinearity.push_back({edge, 0, 0.0, 0.0, 0.0});
-  const StateMatrix T = freeCoordinates(type);
-  std::array<int, kColumnEdges.size()> with_parameters{};
-  int usable = 0, unflagged = 0;
+  result.by_nonlinearity = emptyColumns(kNonlinearityEdges);
+  if (curvatureParameterCount(type.surface) == 1)
+    result.by_curvature = emptyColumns(kCurvatureEdges);
+  ErrorTally state, unflagged;
   for (const Trial& trial : trials) {
     if (trial.outcome == Trial::Outcome::Failed)
       continue;
-    ++usable;
-    const Normalized state =
-        normalized(T * trial.state_error, T * trial.state_covariance * T.transpose());
-    average(result.state_nees_per_dof, state.nees_per_dof, usable);
-    average(result.state_coverage95, state.within, usable);
-    const auto at = static_cast<std::size_t>(
-        std::lower_bound(kColumnEdges.begin(), kColumnEdges.end(), trial.nonlinearity) -
-        kColumnEdges.begin());
-    ConsistencyColumn& column =
-        result.by_nonlinearity[std::min(at, kColumnEdges.size() - 1)];
-    ++column.trials;
-    average(column.state_nees_per_dof, state.nees_per_dof, column.trials);
-    average(column.state_coverage95, state.within, column.trials);
-    if (trial.outcome == Trial::Outcome::Switched)
-      continue;
-    const Normalized parameters =
-        normalized(trial.error + trial.shift, trial.covariance);
-    average(column.nees_per_dof, parameters.nees_per_dof, ++with_parameters[at]);
-    if (!trial.flagged)
-      average(result.unflagged_nees_per_dof, parameters.nees_per_dof, ++unflagged);
+    add(state, trial.state);
+    add(result.parts, trial.parts);
+    add(trial.flagged ? result.flagged_state : result.unflagged_state, trial.state);
+    addTo(columnOf(trial.nonlinearity, result.by_nonlinearity), trial);
+    if (!result.by_curvature.empty())
+      addTo(columnOf(trial.curvature_in_sigmas, result.by_curvature), trial);
+    if (trial.outcome == Trial::Outcome::Used && !trial.flagged)
+      add(unflagged, trial.parameters);
   }
-  result.unflagged_rate = usable > 0 ? static_cast<double>(unflagged) / usable : 0.0;
+  result.state_nees_per_dof = state.nees_per_dof;
+  result.state_coverage95 = state.coverage95;
+  result.unflagged_nees_per_dof = unflagged.nees_per_dof;
+  result.unflagged_rate =
+      state.count > 0 ? static_cast<double>(unflagged.count) / state.count : 0.0;
+}
+
+// Of one check, as it was counted before it was divided.
+ErrorTally
+tallyOf(double trials, double nees_per_dof, double coverage95)
+{
+  return {static_cast<int>(std::lround(trials)), nees_per_dof, coverage95};
+}
+
+void
+addColumns(std::vector<ConsistencyColumn>& columns,
+           const std::vector<ConsistencyColumn>& others)
+{
+  if (columns.empty())
+    columns = others;
+  else
+    for (std::size_t i = 0; i < others.size(); ++i) {
+      add(columns[i].state, others[i].state);
+      add(columns[i].parameters, others[i].parameters);
+    }
+}
+
+// Means over all trials, whatever came of them.
+void
+addRates(ConsistencyResult& all, const ConsistencyResult& one)
+{
+  all.trials += one.trials;
+  const double share = static_cast<double>(one.trials) / all.trials;
+  for (double ConsistencyResult::*rate : {&ConsistencyResult::nees_per_dof_about_mean,
+                                          &ConsistencyResult::type_error_rate,
+                                          &ConsistencyResult::switch_rate,
+                                          &ConsistencyResult::failure_rate})
+    all.*rate += share * (one.*rate - all.*rate);
 }
 
 } // namespace
@@ -377,55 +418,40 @@ pooled(const std::vector<ConsistencyResult>& results)
 {
   ConsistencyResult all;
   double points = 0.0;
-  int usable = 0, unflagged = 0;
-  for (const double edge : kColumnEdges)
-    all.by_nonlinearity.push_back({edge, 0, 0.0, 0.0, 0.0});
-  const auto add = [](double& mean, int& count, double other, int more) {
-    count += more;
-    if (count > 0)
-      mean += (other - mean) * more / count;
-  };
+  ErrorTally parameters, state, unflagged;
   for (const ConsistencyResult& one : results) {
-    int before = all.trials;
-    const auto addRate = [&](double& mean, double other) {
-      int count = before;
-      add(mean, count, other, one.trials);
-    };
-    addRate(points, one.points);
-    addRate(all.nees_per_dof, one.nees_per_dof);
-    addRate(all.nees_per_dof_about_mean, one.nees_per_dof_about_mean);
-    addRate(all.coverage95, one.coverage95);
-    addRate(all.type_error_rate, one.type_error_rate);
-    addRate(all.switch_rate, one.switch_rate);
-    addRate(all.failure_rate, one.failure_rate);
-    all.trials += one.trials;
-    const int used =
-        static_cast<int>(std::lround((1.0 - one.failure_rate) * one.trials));
-    int count = usable;
-    add(all.state_nees_per_dof, count, one.state_nees_per_dof, used);
-    add(all.state_coverage95, usable, one.state_coverage95, used);
-    add(all.unflagged_nees_per_dof,
-        unflagged,
-        one.unflagged_nees_per_dof,
-        static_cast<int>(std::lround(one.unflagged_rate * used)));
-    for (std::size_t i = 0; i < kColumnEdges.size(); ++i) {
-      ConsistencyColumn& column = all.by_nonlinearity[i];
-      const ConsistencyColumn& other = one.by_nonlinearity[i];
-      int of_state = column.trials, of_coverage = column.trials;
-      add(column.state_nees_per_dof, of_state, other.state_nees_per_dof, other.trials);
-      add(column.state_coverage95, of_coverage, other.state_coverage95, other.trials);
-      add(column.nees_per_dof, column.trials, other.nees_per_dof, other.trials);
-    }
+    addRates(all, one);
+    points += static_cast<double>(one.points) * one.trials;
+    const double usable = (1.0 - one.failure_rate) * one.trials;
+    add(parameters,
+        tallyOf(usable - one.switch_rate * one.trials,
+                one.nees_per_dof,
+                one.coverage95));
+    add(state, tallyOf(usable, one.state_nees_per_dof, one.state_coverage95));
+    add(unflagged,
+        tallyOf(one.unflagged_rate * usable, one.unflagged_nees_per_dof, 0.0));
+    add(all.unflagged_state, one.unflagged_state);
+    add(all.flagged_state, one.flagged_state);
+    add(all.parts, one.parts);
+    addColumns(all.by_nonlinearity, one.by_nonlinearity);
+    addColumns(all.by_curvature, one.by_curvature);
   }
-  all.points = static_cast<int>(std::lround(points));
-  all.unflagged_rate = usable > 0 ? static_cast<double>(unflagged) / usable : 0.0;
+  all.nees_per_dof = parameters.nees_per_dof;
+  all.coverage95 = parameters.coverage95;
+  all.state_nees_per_dof = state.nees_per_dof;
+  all.state_coverage95 = state.coverage95;
+  all.unflagged_nees_per_dof = unflagged.nees_per_dof;
+  all.unflagged_rate =
+      state.count > 0 ? static_cast<double>(unflagged.count) / state.count : 0.0;
+  if (all.trials > 0)
+    all.points = static_cast<int>(std::lround(points / all.trials));
   return all;
 }
 
 ConsistencyResult
 checkConsistency(const Scene& scene,
                  const RayGrid& rays,
-                 const NoiseModel& noise,
+                 const Sensor& sensor,
                  const ConsistencyOptions& options)
 {
   if (scene.patches.empty())
@@ -435,12 +461,12 @@ checkConsistency(const Scene& scene,
   if (!(options.noise_scale > 0.0))
     throw std::invalid_argument("noise_scale must be positive");
   const PatchType type = scene.patches[0].type;
-  const TruePoints truth = truePoints(scene, rays, noise, options.noise_scale);
+  const TruePoints truth = truePoints(scene, rays, sensor, options.noise_scale);
   if (truth.points.empty())
     throw std::invalid_argument("the sensor does not see the patch");
   const FitOptions fit = withType(options.fit, type);
 
-  const TrialRunner runner(truth, noise, fit, type, options);
+  const TrialRunner runner(truth, sensor, fit, type, options);
   const FitResult reference = runner.noiseFree(CovarianceMode::SecondOrder, fit);
   if (!isUsable(reference.status))
     throw std::invalid_argument("the noise-free points do not determine the patch: " +
@@ -450,7 +476,7 @@ checkConsistency(const Scene& scene,
   const std::vector<Trial> trials = runTrials(runner, reference, options);
   summarize(trials, result);
   summarizeStates(trials, type, result);
-  const ParameterVector shift = tangentShift(reference.patch, reference.mean_shift);
+  const ParameterVector shift = tangentShift(reference);
   for (std::size_t i = 0; i < result.bias_sigma.size(); ++i) {
     const double predicted = std::sqrt(toTangent(reference.patch, reference.covariance)
                                            .diagonal()[static_cast<Eigen::Index>(i)]);
@@ -458,6 +484,18 @@ checkConsistency(const Scene& scene,
     result.bias_after_shift_sigma[i] -= shift[static_cast<Eigen::Index>(i)] / sigma;
   }
   return result;
+}
+
+ConsistencyResult
+checkConsistency(const Scene& scene,
+                 const RayGrid& rays,
+                 const NoiseModel& noise,
+                 const ConsistencyOptions& options)
+{
+  Sensor sensor;
+  // No owner: the caller's outlives the call.
+  sensor.noise = NoiseModel::ConstPtr(NoiseModel::ConstPtr(), &noise);
+  return checkConsistency(scene, rays, sensor, options);
 }
 
 } // namespace holdfast

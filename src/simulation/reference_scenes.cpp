@@ -95,15 +95,6 @@ lineOfSight(double tilt, double azimuth)
           std::cos(tilt)};
 }
 
-/// The camera of the robot's scenes.
-Camera
-robotCamera()
-{
-  Camera kinect;
-  kinect.fx = kinect.fy = 580.0;
-  return kinect;
-}
-
 /// Draws in the order they are asked for.
 class Draw {
 public:
@@ -143,7 +134,39 @@ scaledPatch(PatchType type, double radius, double bend, double share)
   return patch;
 }
 
+/// How a random patch is seen: metres, radians.
+struct View {
+  double distance, tilt, azimuth;
+  double radius; ///< of the patch
+  double bend, share; ///< of scaledPatch()
+  double aside, direction; ///< of the patch from the middle of the image
+  int stride;
+};
+
+ReferenceScene
+sceneOf(const View& view, PatchType type)
+{
+  ReferenceScene result = sceneOf("random",
+                                  scaledPatch(type, view.radius, view.bend, view.share),
+                                  view.distance * lineOfSight(view.tilt, view.azimuth),
+                                  pixelRays(referenceCamera(), view.stride));
+  const Pose& pose = result.scene.sensor_pose;
+  const Eigen::Vector3d target =
+      view.aside * (std::cos(view.direction) * pose.R.col(0) +
+                    std::sin(view.direction) * pose.R.col(1));
+  result.scene.sensor_pose = lookAt(pose.c, target, Eigen::Vector3d::UnitY());
+  return result;
+}
+
 } // namespace
+
+Camera
+referenceCamera()
+{
+  Camera kinect;
+  kinect.fx = kinect.fy = 580.0;
+  return kinect;
+}
 
 ReferenceScene
 tableTwoScene(PatchType type)
@@ -163,32 +186,46 @@ robotScene(PatchType type, double distance, double tilt, double azimuth)
   return sceneOf("robot",
                  robotPatch(type),
                  distance * lineOfSight(tilt, azimuth),
-                 pixelRays(robotCamera(), 6));
+                 pixelRays(referenceCamera(), 6));
 }
 
 ReferenceScene
 randomScene(PatchType type, std::mt19937_64& generator)
 {
   Draw draw(generator);
-  const double distance = draw.uniform(0.6, 2.0), tilt = draw.uniform(0.0, 1.1);
-  const double azimuth = draw.uniform(0.0, 2.0 * kPi);
-  const double radius = draw.ratio(0.02, 0.25), points = draw.ratio(60.0, 5000.0);
-  const double bend = draw.ratio(0.05, 0.8), share = draw.uniform(0.05, 1.0);
-  const double aside = draw.uniform(0.0, 0.3) * distance;
-  const double direction = draw.uniform(0.0, 2.0 * kPi);
-  const Camera camera = robotCamera();
-  const double pixels = kPi * radius * radius * std::cos(tilt) * camera.fx * camera.fy /
-                        (distance * distance);
-  const int stride = std::max(1, static_cast<int>(std::sqrt(pixels / points)));
-  ReferenceScene result = sceneOf("random",
-                                  scaledPatch(type, radius, bend, share),
-                                  distance * lineOfSight(tilt, azimuth),
-                                  pixelRays(camera, stride));
-  const Pose& pose = result.scene.sensor_pose;
-  const Eigen::Vector3d target = aside * (std::cos(direction) * pose.R.col(0) +
-                                          std::sin(direction) * pose.R.col(1));
-  result.scene.sensor_pose = lookAt(pose.c, target, Eigen::Vector3d::UnitY());
-  return result;
+  View view{};
+  view.distance = draw.uniform(0.6, 2.0);
+  view.tilt = draw.uniform(0.0, 1.1);
+  view.azimuth = draw.uniform(0.0, 2.0 * kPi);
+  view.radius = draw.ratio(0.02, 0.25);
+  const double points = draw.ratio(60.0, 5000.0);
+  view.bend = draw.ratio(0.05, 0.8);
+  view.share = draw.uniform(0.05, 1.0);
+  view.aside = draw.uniform(0.0, 0.3) * view.distance;
+  view.direction = draw.uniform(0.0, 2.0 * kPi);
+  const Camera camera = referenceCamera();
+  const double pixels = kPi * view.radius * view.radius * std::cos(view.tilt) *
+                        camera.fx * camera.fy / (view.distance * view.distance);
+  view.stride = std::max(1, static_cast<int>(std::sqrt(pixels / points)));
+  return sceneOf(view, type);
+}
+
+ReferenceScene
+randomCloseScene(PatchType type, std::mt19937_64& generator)
+{
+  constexpr int kStrides = 6;
+  Draw draw(generator);
+  View view{};
+  view.distance = 1.0;
+  view.tilt = draw.uniform(0.0, 1.1);
+  view.azimuth = draw.uniform(0.0, 2.0 * kPi);
+  view.radius = draw.ratio(0.03, 0.10);
+  view.bend = draw.ratio(0.05, 0.8);
+  view.share = draw.uniform(0.05, 1.0);
+  view.aside = draw.uniform(0.0, 0.3);
+  view.direction = draw.uniform(0.0, 2.0 * kPi);
+  view.stride = 1 + static_cast<int>(draw.uniform(0.0, kStrides));
+  return sceneOf(view, type);
 }
 
 } // namespace holdfast

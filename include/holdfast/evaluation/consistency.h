@@ -10,13 +10,26 @@
 
 namespace holdfast {
 
-/// Trials by the nonlinearity that their fits report.
+/// How the errors of several fits compare with their covariances.
+struct ErrorTally {
+  int count = 0;
+  double nees_per_dof = 0.0; ///< mean normalised squared error over its rank
+  double coverage95 = 0.0; ///< share within the 95 % ellipsoid
+};
+
+/// Of parts of the state, each alone. Where neighbours share errors and points are
+/// many, what is a point's own averages away, and the parts move together, along a line
+/// that bends: each can be right and the whole too sure.
+struct StateTallies {
+  ErrorTally moments, curvature, normal, centre;
+  ErrorTally surface; ///< the normal, and the height of the centre along it
+};
+
+/// Trials by a number that their fits report.
 struct ConsistencyColumn {
-  double up_to = 0.0; ///< FitResult::nonlinearity
-  int trials = 0;
-  double state_nees_per_dof = 0.0;
-  double state_coverage95 = 0.0;
-  double nees_per_dof = 0.0; ///< of the parameters, axes that switched left out
+  double up_to = 0.0; ///< largest such number; the last column has no end
+  ErrorTally state;
+  ErrorTally parameters; ///< axes that switched left out
 };
 
 struct ConsistencyOptions {
@@ -55,10 +68,17 @@ struct ConsistencyResult {
   /// coverage95, which are those of the parameters.
   double state_nees_per_dof = 0.0;
   double state_coverage95 = 0.0;
-  /// Of those without a flag, and their share in the usable trials.
+  /// Of the parameters of trials without a flag (FitResult::flags), and the share of
+  /// those in the usable trials.
   double unflagged_nees_per_dof = 0.0;
   double unflagged_rate = 0.0;
+  /// Of the state, without and with a flag.
+  ErrorTally unflagged_state, flagged_state;
+  StateTallies parts; ///< of the state, over all usable trials
+  /// By FitResult::nonlinearity: the sigma of the axis or of the curvature, rescaled.
   std::vector<ConsistencyColumn> by_nonlinearity;
+  /// By |kappa| in sigmas; empty where a type has none, or two.
+  std::vector<ConsistencyColumn> by_curvature;
   double type_error_rate = 0.0;
   /// Trials whose axes came out turned by more than 45 degrees; left out above.
   double switch_rate = 0.0;
@@ -71,9 +91,18 @@ struct ConsistencyResult {
 ConsistencyResult pooled(const std::vector<ConsistencyResult>& results);
 
 /// \param scene its first patch is fitted; points on anything else are not used.
-/// \param noise the model that noise is drawn from and covariances are taken from.
-/// \throw std::invalid_argument when options make no sense, the scene has no patch, or
-///        the noise-free points do not determine it.
+/// \param sensor noise is drawn from its model and its pattern, if it has one, and the
+/// covariances are taken from them; of its camera only what the pattern needs is used:
+/// which pixels the rays meet.
+/// \throw std::invalid_argument when options make no sense, the scene has no patch, the
+///        noise-free points do not determine it, or there is a pattern and the rays do
+///        not lie on rows and columns of the camera.
+ConsistencyResult checkConsistency(const Scene& scene,
+                                   const RayGrid& rays,
+                                   const Sensor& sensor,
+                                   const ConsistencyOptions& options);
+
+/// The same for independent errors of a noise model, which must outlive the call.
 ConsistencyResult checkConsistency(const Scene& scene,
                                    const RayGrid& rays,
                                    const NoiseModel& noise,

@@ -20,6 +20,9 @@ struct ReferenceScene {
 /// \throw std::invalid_argument when the type is not legal.
 ReferenceScene tableTwoScene(PatchType type);
 
+/// The Kinect of robotScene(), randomScene() and randomCloseScene(): 580 px.
+Camera referenceCamera();
+
 /// A patch of the size of a foot or hand, about 0.1 m, seen by a Kinect (580 px, every
 /// sixth pixel).
 /// \param distance from the sensor to the patch, m.
@@ -35,5 +38,9 @@ ReferenceScene robotScene(PatchType type, double distance, double tilt, double a
 /// sizes, curvatures and numbers of points in equal ratios. \throw
 /// std::invalid_argument when the type is not legal.
 ReferenceScene randomScene(PatchType type, std::mt19937_64& generator);
+
+/// The same from 1 m, 3 to 10 cm large, at a stride of 1 to 6 pixels.
+/// \throw std::invalid_argument when the type is not legal.
+ReferenceScene randomCloseScene(PatchType type, std::mt19937_64& generator);
 
 } // namespace holdfast
