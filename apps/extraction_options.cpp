@@ -131,9 +131,10 @@ addNeighborhoodOptions(CLI::App& command, SamplerOptions& sampler)
       "--neighborhood",
       sampler.neighborhood,
       kNeighborhoodNames,
-      "Points around a seed: pixels within the image of the radius, points within "
-      "it, the same along the surface, or the --k nearest")
-      ->default_str("disc")
+      "Points around a seed: those whose rays meet its surface within the radius, "
+      "pixels within the image of the radius, points within it, the same along paths "
+      "over the points, or the --k nearest")
+      ->default_str("patch")
       ->group(group);
   command.add_option("--k", sampler.k, "Points of a knn neighbourhood")
       ->check(CLI::Range(3, 100000000, "N"))

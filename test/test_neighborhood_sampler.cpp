@@ -311,6 +311,158 @@ TEST(Disc, IsTheFloodFillOfItsDefinition)
   }
 }
 
+// ---- Patch ----
+
+/// A plane through (0, 0, 1), tilted about a random axis in the image.
+struct TiltedPlane {
+  Eigen::Vector3d normal;
+  Camera camera;
+
+  TiltedPlane(double tilt, const Camera& seen_by, Random& random) : camera(seen_by)
+  {
+    const double azimuth = random.uniform(0.0, 6.28);
+    normal << std::sin(tilt) * std::cos(azimuth), std::sin(tilt) * std::sin(azimuth),
+        -std::cos(tilt);
+  }
+
+  /// Nothing where the ray misses it.
+  double depthAt(int u, int v) const
+  {
+    const Eigen::Vector3d ray((u - camera.cx) / camera.fx,
+                              (v - camera.cy) / camera.fy,
+                              1.0);
+    const double z = normal.z() / normal.dot(ray);
+    return z > 0.2 && z < 5.0 ? z : std::nan("");
+  }
+};
+
+RangeCloud
+unorganized(const RangeCloud& cloud)
+{
+  RangeCloud list = cloud;
+  auto points = pcl::make_shared<pcl::PointCloud<pcl::PointXYZ>>(*cloud.points);
+  points->width *= points->height;
+  points->height = 1;
+  list.points = points;
+  return list;
+}
+
+// On a plane the ball of the exact points is the disc along it.
+TEST(Patch, OnAPlaneIsItsDiscAtEveryTilt)
+{
+  for (std::uint64_t c = 0; c < 40; ++c) {
+    Random random(c);
+    const TiltedPlane plane(random.uniform(0.0, 1.3), kCamera, random);
+    const RangeCloud cloud = makeOrganizedCloud(
+        kCamera,
+        [&](int u, int v) { return plane.depthAt(u, v); },
+        randomPose(random));
+    const int seed = 30 * kCamera.width + 40;
+    const double radius = random.uniform(0.05, 0.15);
+    for (const RangeCloud& seen : {cloud, unorganized(cloud)}) {
+      const Indices inner =
+          neighborhoodOf(seen,
+                         makeOptions(Neighborhood::Ball, radius * (1.0 - 1e-4)),
+                         seed);
+      const Indices outer =
+          neighborhoodOf(seen,
+                         makeOptions(Neighborhood::Ball, radius * (1.0 + 1e-4)),
+                         seed);
+      const Indices patch =
+          neighborhoodOf(seen, makeOptions(Neighborhood::Patch, radius), seed);
+      EXPECT_TRUE(
+          std::includes(patch.begin(), patch.end(), inner.begin(), inner.end()));
+      EXPECT_TRUE(
+          std::includes(outer.begin(), outer.end(), patch.begin(), patch.end()));
+    }
+  }
+}
+
+// Which points belong is decided by their rays: of noisy points very nearly the same as
+// of exact ones, and the same share of either tail.
+TEST(Patch, DoesNotCutTheTailsOfTheNoise)
+{
+  const Camera camera = makeCamera(160, 120, 200.0);
+  double spread = 0.0;
+  int points = 0;
+  for (std::uint64_t c = 0; c < 40; ++c) {
+    Random random(c);
+    const TiltedPlane plane(random.uniform(0.0, 1.1), camera, random);
+    constexpr double kSigma = 0.006; // of depth, twice a pixel
+    std::vector<double> error;
+    const RangeCloud cloud = makeOrganizedCloud(camera, [&](int u, int v) {
+      error.push_back(random.normal());
+      return plane.depthAt(u, v) + kSigma * error.back();
+    });
+    const int seed = 60 * camera.width + 80;
+    Sensor sensor = makeSensor(camera);
+    const NeighborhoodSampler sampler(cloud,
+                                      sensor,
+                                      makeOptions(Neighborhood::Patch, 0.08));
+    const auto scratch = sampler.makeScratch();
+    Indices indices;
+    sampler.neighborhood(seed, *scratch, indices);
+    EXPECT_GT(indices.size(), 50U);
+    for (const int i : indices) {
+      spread += error[static_cast<std::size_t>(i)] * error[static_cast<std::size_t>(i)];
+      ++points;
+    }
+  }
+  // A ball cuts it to 0.7 here. Four standard deviations of the mean of squares.
+  EXPECT_NEAR(spread / points, 1.0, 4.0 * std::sqrt(2.0 / points));
+}
+
+TEST(Patch, EndsAtAStepAndAtAGrazingOne)
+{
+  for (const double slope : {0.0, 2.0}) {
+    const auto depthAt = [slope](int u, int v) {
+      const double z = 1.0 / (1.0 + slope * (v - 30) / kCamera.fy);
+      return u < 40 ? z : z + 0.1;
+    };
+    const RangeCloud cloud = makeOrganizedCloud(kCamera, depthAt);
+    const SamplerOptions options = makeOptions(Neighborhood::Patch, 0.1);
+    for (const int u : {36, 38, 41, 43}) {
+      const Indices patch = neighborhoodOf(cloud, options, 30 * kCamera.width + u);
+      EXPECT_GT(patch.size(), 50U);
+      for (const int i : patch)
+        EXPECT_EQ(i % kCamera.width < 40, u < 40) << "seed column " << u;
+    }
+  }
+}
+
+TEST(Patch, GoesAroundAHoleButNotAcrossATrench)
+{
+  const auto depthAt = [](int u, int v) {
+    return u == 40 ? (v > 22 ? std::nan("") : 1.0) : u == 30 ? 1.3 : 1.0;
+  };
+  const RangeCloud cloud = makeOrganizedCloud(kCamera, depthAt);
+  const Indices patch = neighborhoodOf(cloud,
+                                       makeOptions(Neighborhood::Patch, 0.1),
+                                       30 * kCamera.width + 38);
+  EXPECT_TRUE(std::binary_search(patch.begin(), patch.end(), 30 * kCamera.width + 42));
+  for (const int i : patch)
+    EXPECT_GT(i % kCamera.width, 30);
+}
+
+// Two walls that meet in an edge: what lies behind it is none of the seed's surface,
+// once asked strictly.
+TEST(Patch, StrictlyEndsAtAnEdge)
+{
+  const auto depthAt = [](int u, int) {
+    return 1.0 / (1.0 + (u < 40 ? 0.0 : 1.2 * (u - 40) / kCamera.fx));
+  };
+  const RangeCloud cloud = makeOrganizedCloud(kCamera, depthAt);
+  const NeighborhoodSampler sampler(cloud,
+                                    makeSensor(kCamera),
+                                    makeOptions(Neighborhood::Patch, 0.1));
+  const auto scratch = sampler.makeScratch();
+  Indices strict;
+  sampler.strictNeighborhood(30 * kCamera.width + 33, *scratch, strict);
+  EXPECT_GT(strict.size(), 100U);
+  for (const int i : strict)
+    EXPECT_LE(i % kCamera.width, 42); // two pixels are within five sigmas
+}
+
 TEST(Geodesic, IsWithinTheBallAndNearlyAllOfItOnAWall)
 {
   const RangeCloud cloud = makeOrganizedCloud(kCamera, [](int, int) { return 1.0; });
@@ -535,7 +687,8 @@ TEST(Seeds, OfPoissonDiscAreSpacedAndLeaveNoRoom)
 
 // ---- Degenerate input ----
 
-const std::array<Neighborhood, 4> kNeighborhoods{Neighborhood::Disc,
+const std::array<Neighborhood, 5> kNeighborhoods{Neighborhood::Patch,
+                                                 Neighborhood::Disc,
                                                  Neighborhood::Ball,
                                                  Neighborhood::Geodesic,
                                                  Neighborhood::Knn};
@@ -579,8 +732,10 @@ TEST(Degenerate, OnePointIsItsOwnNeighborhood)
 TEST(Degenerate, RadiiBelowAPixelLeaveTheSeed)
 {
   const RangeCloud cloud = makeOrganizedCloud(kCamera, [](int, int) { return 1.0; });
-  for (const Neighborhood kind :
-       {Neighborhood::Disc, Neighborhood::Ball, Neighborhood::Geodesic})
+  for (const Neighborhood kind : {Neighborhood::Patch,
+                                  Neighborhood::Disc,
+                                  Neighborhood::Ball,
+                                  Neighborhood::Geodesic})
     EXPECT_EQ(neighborhoodOf(cloud, makeOptions(kind, 1e-9), 77), Indices{77});
 }
 

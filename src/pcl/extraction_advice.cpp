@@ -84,14 +84,18 @@ measured(const PointSelection& chosen)
 std::string
 fallbackNotice(const NeighborhoodSampler& sampler, const RangeCloud& cloud)
 {
-  if (sampler.options().neighborhood != Neighborhood::Disc || sampler.usesPixels())
+  const bool disc = sampler.options().neighborhood == Neighborhood::Disc;
+  const bool patch = sampler.options().neighborhood == Neighborhood::Patch;
+  const bool organized = cloud.points->height > 1;
+  if (sampler.usesPixels() || !(disc || (patch && organized)))
     return {};
-  if (cloud.points->height < 2)
+  if (!organized)
     return "not organized: balls take the place of discs";
+  const std::string place =
+      disc ? "balls take the place of discs" : "patches are not cut at jumps of depth";
   return "organized, but rows and columns are not the pixels of a camera at the "
-         "sensor's pose (mirrored, turned, or scanned all round?): balls take the "
-         "place "
-         "of discs";
+         "sensor's pose (mirrored, turned, or scanned all round?): " +
+         place;
 }
 
 std::string

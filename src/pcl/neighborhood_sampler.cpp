@@ -5,6 +5,7 @@
 #include "path_search.h"
 #include "pixel_disc.h"
 #include "seeds.h"
+#include "surface_patch.h"
 
 #include <pcl/common/point_tests.h>
 #include <pcl/kdtree/kdtree_flann.h>
@@ -34,6 +35,9 @@ isNotNegative(double x)
 } // namespace
 
 struct NeighborhoodSampler::Scratch {
+  SurfacePatchScratch patch;
+  std::vector<bool> belongs;
+  std::vector<Eigen::Vector3d> candidates;
   std::vector<Run> runs;
   std::vector<PathEnd> heap;
   std::vector<float> path_length;
@@ -59,19 +63,36 @@ struct NeighborhoodSampler::Impl {
   std::vector<int> shuffled(std::vector<int> seeds) const;
   std::vector<int> seeds() const;
 
+  void neighborhood(int seed,
+                    Strictness strictness,
+                    Scratch& scratch,
+                    std::vector<int>& indices) const;
+  void patch(int seed,
+             Strictness strictness,
+             Scratch& scratch,
+             std::vector<int>& indices) const;
+  void treePatch(int seed,
+                 const SurfacePatchSettings& settings,
+                 Scratch& scratch,
+                 std::vector<int>& indices) const;
   void disc(int seed, Scratch& scratch, std::vector<int>& indices) const;
   void ball(int seed, Scratch& scratch, std::vector<int>& indices) const;
   void geodesic(int seed, Scratch& scratch, std::vector<int>& indices) const;
   void knn(int seed, Scratch& scratch, std::vector<int>& indices) const;
 
   void gridBall(int seed, std::vector<int>& indices) const;
-  void treeBall(int seed, Scratch& scratch, std::vector<int>& indices) const;
+  void treeBall(int seed,
+                double radius,
+                Scratch& scratch,
+                std::vector<int>& indices) const;
   void gridGeodesic(int seed, Scratch& scratch, std::vector<int>& indices) const;
   void treeGeodesic(int seed, Scratch& scratch, std::vector<int>& indices) const;
 
   Eigen::Vector3d inCamera(int index) const;
   PixelWindow windowAround(int seed) const;
+  double depthSigma(int seed) const;
   JumpLimit jumpLimit(int seed) const;
+  JumpLimit jumpLimit(int seed, double sigma_z) const;
   float distance(int a, int b) const;
 
   const RangeCloud& cloud;
@@ -156,13 +177,13 @@ NeighborhoodSampler::Impl::distance(int a, int b) const
   return (points[a].getVector3fMap() - points[b].getVector3fMap()).norm();
 }
 
-JumpLimit
-NeighborhoodSampler::Impl::jumpLimit(int seed) const
+// Along the camera's axis, m.
+double
+NeighborhoodSampler::Impl::depthSigma(int seed) const
 {
-  const Eigen::Vector3d q = inCamera(seed);
   double variance = 0.0;
   if (cloud.covariances.empty())
-    variance = noise->covariance(q)(2, 2);
+    variance = noise->covariance(inCamera(seed))(2, 2);
   else {
     const Eigen::Vector3d axis = cloud.sensor_pose.R.col(2);
     const Eigen::Matrix3d S =
@@ -170,8 +191,70 @@ NeighborhoodSampler::Impl::jumpLimit(int seed) const
     variance = axis.dot(S * axis);
   }
   // A covariance that is none (negative, NaN) is no reason to cut.
-  const double sigma = variance > 0.0 ? std::sqrt(variance) : 0.0;
-  return {static_cast<float>(options.jump_sigmas * sigma), options.max_slope * q.z()};
+  return variance > 0.0 ? std::sqrt(variance) : 0.0;
+}
+
+JumpLimit
+NeighborhoodSampler::Impl::jumpLimit(int seed) const
+{
+  return jumpLimit(seed, depthSigma(seed));
+}
+
+JumpLimit
+NeighborhoodSampler::Impl::jumpLimit(int seed, double sigma_z) const
+{
+  return {static_cast<float>(options.jump_sigmas * sigma_z),
+          options.max_slope * inCamera(seed).z()};
+}
+
+void
+NeighborhoodSampler::Impl::patch(int seed,
+                                 Strictness strictness,
+                                 Scratch& scratch,
+                                 std::vector<int>& indices) const
+{
+  const SurfacePatchSettings settings{options.radius_m,
+                                      options.jump_sigmas,
+                                      strictness};
+  if (grid)
+    surfacePatch(*grid,
+                 seed,
+                 jumpLimit(seed),
+                 depthSigma(seed),
+                 settings,
+                 scratch.patch,
+                 indices);
+  else if (noise->isOmnidirectional() || inCamera(seed).z() <= 0.0)
+    treeBall(seed, options.radius_m, scratch, indices);
+  else
+    treePatch(seed, settings, scratch, indices);
+}
+
+void
+NeighborhoodSampler::Impl::treePatch(int seed,
+                                     const SurfacePatchSettings& settings,
+                                     Scratch& scratch,
+                                     std::vector<int>& indices) const
+{
+  // A patch that bends by half its radius reaches this much further than that; the
+  // noise puts points off by some sigmas.
+  constexpr double kMargin = 1.15, kSigmas = 4.0;
+  const double sigma = depthSigma(seed);
+  treeBall(seed, kMargin * options.radius_m + kSigmas * sigma, scratch, indices);
+  scratch.candidates.clear();
+  for (const int i : indices)
+    scratch.candidates.push_back(inCamera(i));
+  surfaceMembers(inCamera(seed),
+                 scratch.candidates,
+                 sigma,
+                 settings,
+                 scratch.patch,
+                 scratch.belongs);
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < indices.size(); ++i)
+    if (scratch.belongs[i] || indices[i] == seed)
+      indices[kept++] = indices[i];
+  indices.resize(kept);
 }
 
 void
@@ -190,7 +273,7 @@ NeighborhoodSampler::Impl::ball(int seed,
   if (grid)
     gridBall(seed, indices);
   else
-    treeBall(seed, scratch, indices);
+    treeBall(seed, options.radius_m, scratch, indices);
 }
 
 void
@@ -212,13 +295,11 @@ NeighborhoodSampler::Impl::gridBall(int seed, std::vector<int>& indices) const
 
 void
 NeighborhoodSampler::Impl::treeBall(int seed,
+                                    double radius,
                                     Scratch& scratch,
                                     std::vector<int>& indices) const
 {
-  tree.radiusSearch(points[seed],
-                    options.radius_m,
-                    scratch.found,
-                    scratch.squared_distances);
+  tree.radiusSearch(points[seed], radius, scratch.found, scratch.squared_distances);
   indices.assign(scratch.found.begin(), scratch.found.end());
   std::sort(indices.begin(), indices.end());
 }
@@ -295,7 +376,7 @@ NeighborhoodSampler::Impl::treeGeodesic(int seed,
 {
   constexpr int kNeighbors = 8;
   std::vector<int>& within = scratch.ball;
-  treeBall(seed, scratch, within);
+  treeBall(seed, options.radius_m, scratch, within);
   const auto slotOf = [&within](int index) {
     const auto at = std::lower_bound(within.begin(), within.end(), index);
     return at != within.end() && *at == index ? static_cast<int>(at - within.begin()) :
@@ -442,27 +523,46 @@ NeighborhoodSampler::makeScratch() const
 }
 
 void
+NeighborhoodSampler::Impl::neighborhood(int seed,
+                                        Strictness strictness,
+                                        Scratch& scratch,
+                                        std::vector<int>& indices) const
+{
+  if (seed < 0 || seed >= static_cast<int>(points.size()))
+    throw std::invalid_argument("the cloud has no point " + std::to_string(seed));
+  indices.clear();
+  if (!isValid(seed))
+    return;
+  switch (options.neighborhood) {
+  case Neighborhood::Patch:
+    return patch(seed, strictness, scratch, indices);
+  case Neighborhood::Disc:
+    if (grid)
+      return disc(seed, scratch, indices);
+    return treeBall(seed, options.radius_m, scratch, indices);
+  case Neighborhood::Ball:
+    return ball(seed, scratch, indices);
+  case Neighborhood::Geodesic:
+    return geodesic(seed, scratch, indices);
+  case Neighborhood::Knn:
+    return knn(seed, scratch, indices);
+  }
+}
+
+void
 NeighborhoodSampler::neighborhood(int seed,
                                   Scratch& scratch,
                                   std::vector<int>& indices) const
 {
-  if (seed < 0 || seed >= static_cast<int>(impl_->points.size()))
-    throw std::invalid_argument("the cloud has no point " + std::to_string(seed));
-  indices.clear();
-  if (!impl_->isValid(seed))
-    return;
-  switch (impl_->options.neighborhood) {
-  case Neighborhood::Disc:
-    if (impl_->grid)
-      return impl_->disc(seed, scratch, indices);
-    return impl_->treeBall(seed, scratch, indices);
-  case Neighborhood::Ball:
-    return impl_->ball(seed, scratch, indices);
-  case Neighborhood::Geodesic:
-    return impl_->geodesic(seed, scratch, indices);
-  case Neighborhood::Knn:
-    return impl_->knn(seed, scratch, indices);
-  }
+  impl_->neighborhood(seed, Strictness::Usual, scratch, indices);
+}
+
+void
+NeighborhoodSampler::strictNeighborhood(int seed,
+                                        Scratch& scratch,
+                                        std::vector<int>& indices) const
+{
+  impl_->neighborhood(seed, Strictness::Strict, scratch, indices);
 }
 
 } // namespace holdfast

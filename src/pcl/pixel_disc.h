@@ -1,7 +1,7 @@
 /// \file The pixels of one surface within a disc around a seed.
 #pragma once
 
-#include "pixel_grid.h"
+#include "pixel_runs.h"
 
 #include <algorithm>
 #include <vector>
@@ -17,14 +17,6 @@ struct JumpLimit {
   {
     return std::max(noise, static_cast<float>(slope_m * slope_difference));
   }
-};
-
-/// Connected pixels [begin, end) of one row; runs that touch form a tree by `parent`.
-struct Run {
-  int row;
-  int begin;
-  int end;
-  int parent;
 };
 
 /// Replaces `indices` by the pixels within the image of `radius_m` at the depth of the

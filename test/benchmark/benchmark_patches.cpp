@@ -95,7 +95,7 @@ void
 wholeChain(benchmark::State& state, const Sensor& sensor, int points, int threads)
 {
   ExtractionOptions options;
-  options.sampler = samplerOptions(Neighborhood::Disc, points);
+  options.sampler = samplerOptions(Neighborhood::Patch, points);
   options.threads = threads;
   const ExtractionResult once = extractPatches(scene().cloud, sensor, options);
   std::size_t seeds = once.patches.size();
@@ -114,7 +114,7 @@ wholeChain(benchmark::State& state, const Sensor& sensor, int points, int thread
 void
 framePreparation(benchmark::State& state)
 {
-  const SamplerOptions options = samplerOptions(Neighborhood::Disc, 100);
+  const SamplerOptions options = samplerOptions(Neighborhood::Patch, 100);
   measure(state, 1, [&] {
     const NeighborhoodSampler sampler(scene().cloud, scene().sensor, options);
     benchmark::DoNotOptimize(sampler.seeds());
@@ -124,7 +124,7 @@ framePreparation(benchmark::State& state)
 void
 neighborhoods(benchmark::State& state, int points)
 {
-  const SamplerOptions options = samplerOptions(Neighborhood::Disc, points);
+  const SamplerOptions options = samplerOptions(Neighborhood::Patch, points);
   const NeighborhoodSampler sampler(scene().cloud, scene().sensor, options);
   const auto scratch = sampler.makeScratch();
   const std::vector<int> seeds = sampler.seeds();
@@ -141,7 +141,7 @@ neighborhoods(benchmark::State& state, int points)
 void
 fitCovariance(benchmark::State& state, int points, CovarianceMode mode)
 {
-  const SamplerOptions options = samplerOptions(Neighborhood::Disc, points);
+  const SamplerOptions options = samplerOptions(Neighborhood::Patch, points);
   std::vector<PointBatch> batches = gatherBatches(scene(), options);
   const PatchEstimator estimator(FitOptions{}, mode);
   double iterations = 0.0;
@@ -188,7 +188,7 @@ pclNormal(benchmark::State& state, int points)
 void
 ceresAutodiff(benchmark::State& state, int points)
 {
-  const SamplerOptions options = samplerOptions(Neighborhood::Disc, points);
+  const SamplerOptions options = samplerOptions(Neighborhood::Patch, points);
   std::vector<PointBatch> batches = gatherBatches(scene(), options);
   batches.resize(200); // slow: a few are enough
   double converged = 0.0;

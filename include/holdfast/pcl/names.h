@@ -7,8 +7,8 @@
 
 namespace holdfast {
 
-inline constexpr EnumNames<Neighborhood, 4> kNeighborhoodNames{
-    {"disc", "ball", "geodesic", "knn"}};
+inline constexpr EnumNames<Neighborhood, 5> kNeighborhoodNames{
+    {"patch", "disc", "ball", "geodesic", "knn"}};
 
 inline constexpr EnumNames<SeedStrategy, 3> kSeedStrategyNames{
     {"grid", "random", "poisson"}};

@@ -12,6 +12,11 @@
 namespace holdfast {
 
 enum class Neighborhood : std::uint8_t {
+  /// Points whose rays meet the surface around the seed within the radius, measured
+  /// along the surface, so that a patch is as large as asked for at every tilt; in
+  /// organized clouds connected to the seed. Unbiased, since what the noise does to a
+  /// point along its ray does not decide. Clouds without a known viewpoint: Ball.
+  Patch,
   /// Organized clouds: pixels within the image of the metric radius, connected to the
   /// seed, cut at depth discontinuities. Unbiased: a metric ball cuts the noise tails.
   Disc,
@@ -31,7 +36,7 @@ enum class SeedStrategy : std::uint8_t {
 };
 
 struct SamplerOptions {
-  Neighborhood neighborhood = Neighborhood::Disc;
+  Neighborhood neighborhood = Neighborhood::Patch;
   double radius_m = 0.05;
   int k = 100; ///< points of a Knn neighbourhood
   SeedStrategy strategy = SeedStrategy::Grid;
@@ -95,6 +100,11 @@ public:
   /// none when the seed itself is invalid.
   /// \throw std::invalid_argument when there is no such point.
   void neighborhood(int seed, Scratch& scratch, std::vector<int>& indices) const;
+
+  /// What is left of the neighbourhood where it turned out to be of two surfaces: the
+  /// points on the one that the inner half of the radius shows. Of a Patch; others are
+  /// the same again.
+  void strictNeighborhood(int seed, Scratch& scratch, std::vector<int>& indices) const;
 
 private:
   struct Impl;

@@ -107,7 +107,7 @@ PatchEstimation<PointInT, PointOutT>::effectiveOptions() const
   if (search_radius_ > 0.0) {
     sampler.radius_m = search_radius_;
     if (sampler.neighborhood == Neighborhood::Knn)
-      sampler.neighborhood = Neighborhood::Disc;
+      sampler.neighborhood = Neighborhood::Patch;
   }
   return options;
 }

@@ -1,0 +1,85 @@
+#include "pixel_runs.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace holdfast {
+
+int
+PixelRuns::rootOf(int i)
+{
+  while (runs_[i].parent != i)
+    i = runs_[i].parent = runs_[runs_[i].parent].parent;
+  return i;
+}
+
+/// Whether some pixel of both runs, one above the other, continues the surface.
+bool
+PixelRuns::touch(const Run& a, const Run& b) const
+{
+  const float *row_a = values_.row(a.row), *row_b = values_.row(b.row);
+  const int end = std::min(a.end, b.end);
+  for (int u = std::max(a.begin, b.begin); u < end; ++u)
+    if (std::abs(row_a[u] - row_b[u]) < jump_.across_rows)
+      return true;
+  return false;
+}
+
+/// Joins the runs [above, here) of one row with those after them, of the next; both
+/// lists ascend.
+void
+PixelRuns::joinRows(int above, int here)
+{
+  const int end = static_cast<int>(runs_.size());
+  int a = above;
+  int b = here;
+  while (a < here && b < end) {
+    if (touch(runs_[a], runs_[b]))
+      runs_[rootOf(b)].parent = rootOf(a);
+    if (runs_[a].end < runs_[b].end)
+      ++a;
+    else
+      ++b;
+  }
+}
+
+void
+PixelRuns::addRow(int row, PixelRange columns)
+{
+  const float* value = values_.row(row);
+  const int here = static_cast<int>(runs_.size());
+  int u = columns.begin;
+  while (u < columns.end) {
+    const int begin = u++;
+    // Comparisons with NaN are false: an invalid pixel ends a run.
+    while (u < columns.end && std::abs(value[u] - value[u - 1]) < jump_.in_row)
+      ++u;
+    if (!std::isnan(value[begin]))
+      runs_.push_back({row, begin, u, static_cast<int>(runs_.size())});
+  }
+  joinRows(above_, here);
+  above_ = here;
+}
+
+void
+PixelRuns::component(int u, int v, int image_width, std::vector<int>& indices)
+{
+  indices.clear();
+  const auto seed = std::find_if(runs_.begin(), runs_.end(), [&](const Run& run) {
+    return run.row == v && u >= run.begin && u < run.end;
+  });
+  if (seed == runs_.end())
+    return;
+  const int root = rootOf(static_cast<int>(seed - runs_.begin()));
+  for (int i = 0; i < static_cast<int>(runs_.size()); ++i) {
+    if (rootOf(i) != root)
+      continue;
+    const std::size_t size = indices.size();
+    indices.resize(size + static_cast<std::size_t>(runs_[i].end - runs_[i].begin));
+    int index = runs_[i].row * image_width + runs_[i].begin;
+    for (std::size_t j = size; j < indices.size(); ++j)
+      indices[j] = index++;
+  }
+}
+
+} // namespace holdfast

@@ -1,0 +1,109 @@
+/// \file Where the rays around a seed meet the surface that it lies on.
+///
+/// 1/z as a polynomial of second order in the ray's slopes x/z and y/z. Planes are of
+/// first order in it, exactly, and the errors of disparity sensors are the same all
+/// over, so that plain least squares fit it without bias. What is chosen by where rays
+/// meet it is not chosen by the noise along them.
+#pragma once
+
+#include <Eigen/Core>
+
+#include <array>
+#include <utility>
+
+namespace holdfast {
+
+/// Measured points: the slopes of their rays from those of the seed's ray, and 1/z,
+/// 1/m.
+struct RaySamples {
+  /// More hardly improve the surface, whose errors count only by the slope.
+  static constexpr int kMost = 48;
+
+  int size = 0;
+  double s[kMost], t[kMost], inverse_depth[kMost];
+
+  void add(double s_of_ray, double t_of_ray, double one_over_z)
+  {
+    s[size] = s_of_ray, t[size] = t_of_ray, inverse_depth[size] = one_over_z;
+    ++size;
+  }
+};
+
+class ReferenceSurface {
+public:
+  /// What faces the camera at the depth of the seed.
+  /// \param ray x/z and y/z of the seed
+  ReferenceSurface(const Eigen::Vector2d& ray, double depth_m);
+
+  /// Least squares, of second order where there are points enough for it, else of first
+  /// order. \return false, and nothing changed, where the points do not tell it.
+  bool fit(const RaySamples& samples, int order);
+
+  /// 1/z along a ray.
+  double inverseDepth(double s, double t) const
+  {
+    return h_[0] + s * (h_[1] + h_[4] * t + h_[3] * s) + t * (h_[2] + h_[5] * t);
+  }
+
+  /// Coefficients of 1, s, t, s^2, s t, t^2.
+  const std::array<double, 6>& coefficients() const
+  {
+    return h_;
+  }
+
+  const Eigen::Vector2d& seedRay() const
+  {
+    return ray_;
+  }
+
+  /// Where the seed's ray meets it, camera frame, m.
+  Eigen::Vector3d point() const;
+
+  /// Unit normal there, on either side.
+  Eigen::Vector3d normal() const;
+
+private:
+  Eigen::Vector2d ray_;
+  std::array<double, 6> h_{};
+};
+
+/// Tells whether a ray meets the surface within a distance from where the seed's does,
+/// measured along the tangent plane there.
+class LateralDisc {
+public:
+  LateralDisc(const ReferenceSurface& surface, double radius_m);
+
+  bool contains(double s, double t) const
+  {
+    const double rho = surface_.inverseDepth(s, t);
+    return excess(s, t, rho) <= 0.0;
+  }
+
+  /// Squared distance less squared radius, times rho^2, of the ray's point at 1/z =
+  /// rho.
+  double excess(double s, double t, double rho) const
+  {
+    // rho (P - P0) of the point P = (x, y, 1) / rho.
+    const Eigen::Vector3d g =
+        Eigen::Vector3d(ray_.x() + s, ray_.y() + t, 1.0) - rho * point_;
+    const double off = normal_.dot(g);
+    return g.squaredNorm() - off * off - squared_radius_ * rho * rho;
+  }
+
+  double squaredRadius() const
+  {
+    return squared_radius_;
+  }
+
+  /// Slopes s between which rays of this t meet the tangent plane within the radius;
+  /// first > second when none does. Endless where the plane is seen edge-on.
+  std::pair<double, double> chord(double t) const;
+
+private:
+  ReferenceSurface surface_;
+  Eigen::Vector2d ray_;
+  Eigen::Vector3d point_, normal_;
+  double squared_radius_;
+};
+
+} // namespace holdfast

@@ -1,0 +1,332 @@
+#include "surface_patch.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace holdfast {
+namespace {
+
+// Of the radius: the disc in the image that first tells how the surface is inclined.
+// Its pixels lie within twice this of the seed on surfaces up to 60 degrees.
+constexpr double kFirstShare = 0.35;
+
+// Pixels of that disc to every side, at least: noise tilts the plane of fewer.
+constexpr double kFirstPixels = 3.0;
+
+// Of the radius: the disc on the surface that tells how it is curved.
+constexpr double kSecondShare = 0.75;
+
+// A neighbour may leave the surface by this times their distance, 45 degrees against
+// it.
+constexpr double kSlope = 1.0;
+
+// Points further from the surface than this share of the radius, and than
+// kOutlierSigmas of the noise, are none of it, even where no jump parts them from it:
+// on the far side of an edge, or in the veil between two surfaces. So far out no tail
+// of the noise is missed.
+constexpr double kLargestDeparture = 1.0 / 3.0;
+constexpr double kOutlierSigmas = 5.0;
+
+// From the noise and the radius, m.
+double
+largestDeparture(const SurfacePatchSettings& settings, double sigma_z)
+{
+  const double noise = kOutlierSigmas * sigma_z;
+  return settings.strictness == Strictness::Strict ?
+             noise :
+             std::max(kLargestDeparture * settings.radius_m, noise);
+}
+
+// Within which the surface is fitted.
+double
+fittedRadius(const SurfacePatchSettings& settings)
+{
+  return settings.strictness == Strictness::Strict ? 0.5 * settings.radius_m :
+                                                     kSecondShare * settings.radius_m;
+}
+
+// So that no more samples are taken of so many.
+std::size_t
+stepOver(std::size_t size)
+{
+  constexpr std::size_t kMost = RaySamples::kMost;
+  return std::max<std::size_t>(1, (size + kMost - 1) / kMost);
+}
+
+// LateralDisc::excess() along a row of pixels, in single precision.
+class RowTest {
+public:
+  RowTest(const ReferenceSurface& surface, const LateralDisc& within, double t)
+  {
+    // 1/z = rho[0] + rho[1] s + rho[2] s^2.
+    const std::array<double, 6>& h = surface.coefficients();
+    rho_ = {static_cast<float>(h[0] + t * (h[2] + h[5] * t)),
+            static_cast<float>(h[1] + h[4] * t),
+            static_cast<float>(h[3])};
+    ray_ =
+        surface.seedRay().cast<float>() + Eigen::Vector2f(0.0F, static_cast<float>(t));
+    point_ = surface.point().cast<float>();
+    normal_ = surface.normal().cast<float>();
+    squared_radius_ = static_cast<float>(within.squaredRadius());
+  }
+
+  // For n pixels from slope `s` on. Without branches and with local copies, so that
+  // several pixels are looked at at once.
+  void run(const float* __restrict depth,
+           float s,
+           float pitch,
+           float gate,
+           int n,
+           float* __restrict out) const
+  {
+    constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+    const auto [h0, h1, h2] = rho_;
+    const float x = ray_.x() + s, y = ray_.y();
+    const float px = point_.x(), py = point_.y(), pz = point_.z();
+    const float nx = normal_.x(), ny = normal_.y(), nz = normal_.z();
+    const float rr = squared_radius_;
+    for (int i = 0; i < n; ++i) {
+      const float along = pitch * static_cast<float>(i);
+      const float slope = s + along;
+      const float rho = h0 + slope * (h1 + slope * h2);
+      const float gx = x + along - rho * px, gy = y - rho * py, gz = 1.0F - rho * pz;
+      const float off = nx * gx + ny * gy + nz * gz;
+      const float excess = gx * gx + gy * gy + gz * gz - off * off - rr * rho * rho;
+      const float departure = 1.0F / depth[i] - rho;
+      const bool belongs =
+          (excess <= 0.0F) & (std::abs(departure) <= gate) & (rho > 0.0F);
+      out[i] = belongs ? departure : kNone;
+    }
+  }
+
+private:
+  std::array<float, 3> rho_;
+  Eigen::Vector2f ray_;
+  Eigen::Vector3f point_, normal_;
+  float squared_radius_;
+};
+
+class Search {
+public:
+  Search(const PixelGrid& grid,
+         int seed,
+         double sigma_z,
+         const SurfacePatchSettings& settings,
+         SurfacePatchScratch& scratch)
+  : grid_(grid)
+  , settings_(settings)
+  , scratch_(scratch)
+  , u0_(seed % grid.camera.width)
+  , v0_(seed / grid.camera.width)
+  , depth_(grid.depth[static_cast<std::size_t>(seed)])
+  , sigma_(sigma_z / (depth_ * depth_))
+  , surface_(seedRay(), depth_)
+  {}
+
+  Eigen::Vector2d seedRay() const
+  {
+    const Camera& camera = grid_.camera;
+    return {(u0_ - camera.cx) / camera.fx, (v0_ - camera.cy) / camera.fy};
+  }
+
+  // Through some of the pixels, which ascend.
+  void fitSurface(const std::vector<int>& pixels, int order)
+  {
+    const Camera& camera = grid_.camera;
+    const auto step = stepOver(pixels.size());
+    RaySamples samples;
+    int row = 0, row_begin = 0;
+    for (std::size_t i = step / 2; i < pixels.size(); i += step) {
+      if (pixels[i] >= row_begin + camera.width) {
+        row = pixels[i] / camera.width;
+        row_begin = row * camera.width;
+      }
+      samples.add((pixels[i] - row_begin - u0_) / camera.fx,
+                  (row - v0_) / camera.fy,
+                  1.0 / grid_.depth[static_cast<std::size_t>(pixels[i])]);
+    }
+    surface_.fit(samples, order);
+  }
+
+  // The connected pixels within a radius on the surface found so far.
+  void collect(double radius_m, double departure_m, std::vector<int>& indices)
+  {
+    const Camera& camera = grid_.camera;
+    // Beyond the disc on the tangent plane, for the disc on the curved surface.
+    constexpr double kMargin = 1.2;
+    const LateralDisc within(surface_, radius_m);
+    const LateralDisc about(surface_, kMargin * radius_m);
+    const PixelWindow window = grid_.ballWindow(surface_.point(), kMargin * radius_m);
+    const int columns = window.columns.end - window.columns.begin;
+    const int rows = window.rows.end - window.rows.begin;
+    indices.clear();
+    if (columns <= 0 || rows <= 0)
+      return;
+    scratch_.window.resize(static_cast<std::size_t>(columns) *
+                           static_cast<std::size_t>(rows));
+    float* const first = scratch_.window.data() - window.columns.begin -
+                         static_cast<std::ptrdiff_t>(window.rows.begin) * columns;
+    PixelRuns connected({first, columns}, jump(), scratch_.runs);
+    const auto gate = static_cast<float>(departure_m / (depth_ * depth_));
+    for (int v = window.rows.begin; v < window.rows.end; ++v) {
+      const PixelRange range = chord(about, v, window.columns);
+      writeDepartures(within,
+                      v,
+                      range,
+                      gate,
+                      first + static_cast<std::ptrdiff_t>(v) * columns);
+      connected.addRow(v, range);
+    }
+    connected.component(u0_, v0_, camera.width, indices);
+  }
+
+private:
+  PixelJump jump() const
+  {
+    const double noise = settings_.jump_sigmas * sigma_;
+    const double slope = kSlope / depth_; // of 1/z, per slope of the ray
+    return {static_cast<float>(std::max(noise, slope / grid_.camera.fx)),
+            static_cast<float>(std::max(noise, slope / grid_.camera.fy))};
+  }
+
+  PixelRange chord(const LateralDisc& disc, int v, const PixelRange& columns) const
+  {
+    const auto [low, high] = disc.chord((v - v0_) / grid_.camera.fy);
+    const auto pixel = [&](double s) {
+      return static_cast<int>(std::clamp(s * grid_.camera.fx + u0_,
+                                         static_cast<double>(columns.begin),
+                                         static_cast<double>(columns.end)));
+    };
+    if (!(low <= high))
+      return {columns.begin, columns.begin};
+    return {pixel(std::floor(low)), std::min(pixel(high) + 1, columns.end)};
+  }
+
+  // By how much 1/z of the points leaves the surface; NaN where they are no part of it.
+  void writeDepartures(const LateralDisc& within,
+                       int v,
+                       const PixelRange& range,
+                       float gate,
+                       float* out) const
+  {
+    const float t = static_cast<float>((v - v0_) / grid_.camera.fy);
+    const float pitch = static_cast<float>(1.0 / grid_.camera.fx);
+    const RowTest test(surface_, within, t);
+    test.run(grid_.row(v) + range.begin,
+             pitch * static_cast<float>(range.begin - u0_),
+             pitch,
+             gate,
+             range.end - range.begin,
+             out + range.begin);
+  }
+
+  const PixelGrid& grid_;
+  const SurfacePatchSettings& settings_;
+  SurfacePatchScratch& scratch_;
+  int u0_, v0_;
+  double depth_;
+  double sigma_; // of 1/z
+  ReferenceSurface surface_;
+};
+
+} // namespace
+
+void
+surfacePatch(const PixelGrid& grid,
+             int seed,
+             const JumpLimit& limit,
+             double sigma_z,
+             const SurfacePatchSettings& settings,
+             SurfacePatchScratch& scratch,
+             std::vector<int>& indices)
+{
+  const double radius = settings.radius_m;
+  const double depth = grid.depth[static_cast<std::size_t>(seed)];
+  const double pixel = depth / std::min(grid.camera.fx, grid.camera.fy);
+  Search search(grid, seed, sigma_z, settings, scratch);
+  connectedDisc(grid,
+                seed,
+                std::max(kFirstShare * radius, kFirstPixels * pixel),
+                limit,
+                scratch.runs,
+                scratch.pixels);
+  search.fitSurface(scratch.pixels, 1);
+  const double departure = largestDeparture(settings, sigma_z);
+  search.collect(fittedRadius(settings),
+                 std::max(kLargestDeparture * radius, departure),
+                 scratch.pixels);
+  search.fitSurface(scratch.pixels, 2);
+  search.collect(radius, departure, indices);
+  // The seed itself may be an outlier of its surface.
+  if (indices.empty())
+    indices.push_back(seed);
+}
+
+namespace {
+
+// The candidates' rays, from the seed's, and their 1/z.
+struct Rays {
+  const Eigen::Vector2d seed;
+  const std::vector<Eigen::Vector3d>& points;
+
+  Eigen::Vector2d slopes(std::size_t i) const
+  {
+    return points[i].head<2>() / points[i].z() - seed;
+  }
+};
+
+// Through some of the candidates within a disc on the surface found so far.
+void
+fitWithin(double radius_m,
+          const Rays& rays,
+          int order,
+          std::vector<int>& members,
+          ReferenceSurface& surface)
+{
+  const LateralDisc disc(surface, radius_m);
+  members.clear();
+  for (std::size_t i = 0; i < rays.points.size(); ++i) {
+    const Eigen::Vector2d slopes = rays.slopes(i);
+    if (disc.contains(slopes.x(), slopes.y()))
+      members.push_back(static_cast<int>(i));
+  }
+  RaySamples samples;
+  const std::size_t step = stepOver(members.size());
+  for (std::size_t i = step / 2; i < members.size(); i += step) {
+    const auto member = static_cast<std::size_t>(members[i]);
+    const Eigen::Vector2d slopes = rays.slopes(member);
+    samples.add(slopes.x(), slopes.y(), 1.0 / rays.points[member].z());
+  }
+  surface.fit(samples, order);
+}
+
+} // namespace
+
+void
+surfaceMembers(const Eigen::Vector3d& seed,
+               const std::vector<Eigen::Vector3d>& candidates,
+               double sigma_z,
+               const SurfacePatchSettings& settings,
+               SurfacePatchScratch& scratch,
+               std::vector<bool>& belongs)
+{
+  const Eigen::Vector2d ray(seed.x() / seed.z(), seed.y() / seed.z());
+  ReferenceSurface surface(ray, seed.z());
+  const Rays rays{ray, candidates};
+  const double radius = settings.radius_m;
+  fitWithin(kFirstShare * radius, rays, 1, scratch.members, surface);
+  fitWithin(fittedRadius(settings), rays, 2, scratch.members, surface);
+  const LateralDisc within(surface, radius);
+  const double gate = largestDeparture(settings, sigma_z) / (seed.z() * seed.z());
+  belongs.assign(candidates.size(), false);
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const Eigen::Vector2d slopes = rays.slopes(i);
+    const double rho = surface.inverseDepth(slopes.x(), slopes.y());
+    belongs[i] = rho > 0.0 && candidates[i].z() > 0.0 &&
+                 within.excess(slopes.x(), slopes.y(), rho) <= 0.0 &&
+                 std::abs(1.0 / candidates[i].z() - rho) <= gate;
+  }
+}
+
+} // namespace holdfast
