@@ -26,13 +26,13 @@ shapeText(const WaveEstimate& wave)
   return std::string(kPatternShapeNames.of(wave.shape));
 }
 
-/// A length without an interval was cut off.
+/// Whether a length or its interval was cut off.
 bool
 hasCutOffWave(const NoiseReport& report)
 {
   const auto& waves = report.pattern.waves;
   return std::any_of(waves.begin(), waves.end(), [](const WaveEstimate& wave) {
-    return !std::isfinite(wave.length.high);
+    return std::isinf(wave.length.high);
   });
 }
 
@@ -154,8 +154,8 @@ patternSentences(const NoiseReport& report)
             "independent."};
   std::vector<std::string> sentences{poseSentence(report)};
   if (hasCutOffWave(report))
-    sentences.emplace_back("The long wave is at least as long as the planes can tell; "
-                           "it stands for all that is longer.");
+    sentences.emplace_back("The long wave may be longer than the planes can tell: its "
+                           "length is cut off, and it stands for all that is longer.");
   return sentences;
 }
 
