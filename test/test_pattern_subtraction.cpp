@@ -131,8 +131,9 @@ TEST_F(PatternSubtraction, MapsSurviveTheirFiles)
   for (std::size_t i = 0; i < read.errors().size(); ++i) {
     const float before = sensor_.pattern_map->errors()[i], after = read.errors()[i];
     EXPECT_EQ(std::isnan(after), std::isnan(before));
-    if (!std::isnan(before))
+    if (!std::isnan(before)) {
       EXPECT_NEAR(after, before, 0.5001 / 1024.0);
+    }
   }
   // Beyond what the pixels hold: the largest, never "unknown".
   savePatternMap(path, PatternMap(2, 1, {-50.0F, 50.0F}));

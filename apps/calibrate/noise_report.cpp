@@ -430,17 +430,8 @@ measurePatternMap(const std::vector<std::vector<RangeCloud>>& poses,
     throw std::runtime_error("no pixel saw a plane from two poses, so that no map of "
                              "the pattern can be made");
   const Estimate shared_part = report.pattern.shared_part;
-  report.pattern = calibratePattern(report.map.rest, options);
-  if (report.pattern.status != NoiseCalibrationStatus::Ok)
-    throw std::runtime_error("no plane is left in pose " +
-                             std::to_string(report.pattern.pose + 1) +
-                             " without the map of the others");
-  // Each pose is a part of the maps that were taken from the others: what is left of
-  // two is alike with the opposite sign.
+  report.pattern = report.map.left;
   report.pattern.shared_part = shared_part;
-  for (PatternRow& row : report.pattern.rows)
-    row.between_poses = {};
-  report.map.rest.clear();
   report.sensor.pattern_map = report.map.map;
 }
 

@@ -18,8 +18,8 @@
 namespace holdfast {
 namespace {
 
-constexpr float kZero = 32768.0F; // value of no error
-constexpr float kStepsPerPx = 1024.0F;
+constexpr double kZero = 32768.0; // value of no error
+constexpr double kStepsPerPx = 1024.0;
 constexpr std::uint16_t kUnknown = 0;
 constexpr std::uint64_t kMostPixels = 50000000;
 
@@ -42,9 +42,11 @@ valueOf(float error_px)
 {
   if (std::isnan(error_px))
     return kUnknown;
-  constexpr float kMost = std::numeric_limits<std::uint16_t>::max();
+  constexpr double kMost = std::numeric_limits<std::uint16_t>::max();
   return static_cast<std::uint16_t>(
-      std::clamp(std::round(kZero + kStepsPerPx * error_px), 1.0F, kMost));
+      std::clamp(std::round(kZero + kStepsPerPx * static_cast<double>(error_px)),
+                 1.0,
+                 kMost));
 }
 
 } // namespace
@@ -58,11 +60,13 @@ loadPatternMap(const std::string& path)
     if (bytes.compare(0, kSignature.size(), kSignature) != 0)
       throw std::runtime_error("is no PNG, as a pattern map is");
     const io::DepthImage image = io::readPng(bytes, kMostPixels);
+    if (!image.notices.empty()) // other bytes behind it: nobody wrote that so
+      throw std::runtime_error(image.notices.front());
     std::vector<float> errors;
     for (const std::uint16_t value : image.pixels)
       errors.push_back(value == kUnknown ?
                            std::numeric_limits<float>::quiet_NaN() :
-                           (static_cast<float>(value) - kZero) / kStepsPerPx);
+                           static_cast<float>((value - kZero) / kStepsPerPx));
     return {image.width, image.height, std::move(errors)};
   }
   catch (const std::runtime_error& error) {

@@ -135,32 +135,6 @@ rowVariances(const std::vector<CellSums>& cells, const Eigen::ArrayXd& total)
   return variances;
 }
 
-/// What all poses show on planes, or the pose that shows nothing.
-struct Observed {
-  NoiseCalibrationStatus status = NoiseCalibrationStatus::Ok;
-  int pose = 0;
-  std::vector<PlaneImages> images;
-  BlockCorrelogramBuilder blocks;
-};
-
-Observed
-observe(const std::vector<PoseFrames>& poses, const NoiseCalibrationOptions& options)
-{
-  Observed observed;
-  for (const PoseFrames& pose : poses) {
-    PosePlanes found = findPosePlanes(pose, options);
-    observed.status = found.status;
-    if (found.status != NoiseCalibrationStatus::Ok)
-      return observed;
-    for (const Region& plane : found.regions)
-      observed.blocks.add(found.tiles, plane);
-    observed.images.push_back(std::move(found.images));
-    ++observed.pose;
-  }
-  observed.pose = 0;
-  return observed;
-}
-
 /// Pixels on planes in the pose that has most of them.
 double
 largestArea(const std::vector<PlaneImages>& poses)
@@ -227,14 +201,17 @@ public:
 
   void write(PatternCalibration& result) const
   {
-    result.single = rootOf(estimates_[0]);
+    double square = 0.0;
+    for (std::size_t m = 0; m < waves(); ++m)
+      square += std::pow(samplingError(m) * estimates_[2 + m].value, 2);
+    result.single = rootOf(widened(estimates_[0], std::sqrt(square)));
     result.white = rootOf(estimates_[1]);
     for (std::size_t m = 0; m < waves(); ++m) {
       const double error = samplingError(m);
       const Estimate& variance = estimates_[2 + m];
       const Estimate& log_length = estimates_[2 + waves() + m];
       result.waves.push_back({rootOf(widened(variance, error * variance.value)),
-                              lengthOf(widened(log_length, 0.5 * error)),
+                              lengthOf(widened(log_length, lengthError(m))),
                               fit_.shapes[m]});
     }
     result.shared_part = estimates_.back();
@@ -297,8 +274,16 @@ private:
     return kNormal95 * std::sqrt(2.0 / area_ * share * kPi * length * length);
   }
 
+  /// How steeply a wave begins is known well, sigma^2 / length of an exponential one
+  /// and sigma^2 / length^2 of a Gaussian: its length errs with its sigma.
+  double lengthError(std::size_t m) const
+  {
+    const bool exponential = fit_.shapes[m] == PatternShape::Exponential;
+    return (exponential ? 1.0 : 0.5) * samplingError(m);
+  }
+
   /// The jackknife sees how the cells differ, but not that the waves all of them share
-  /// are few: in quadrature. The relative error of a length is about that of a sigma.
+  /// are few: in quadrature.
   static Estimate widened(const Estimate& estimate, double half)
   {
     return {estimate.value,
@@ -438,24 +423,43 @@ calibratePattern(const std::vector<PoseFrames>& poses,
   if (const std::string error = validityError(options); !error.empty())
     throw std::invalid_argument(error);
   requireSameSizes(poses);
-  const Observed observed = observe(poses, options);
-  PatternCalibration result;
-  result.poses = static_cast<int>(poses.size());
-  result.status = observed.status;
-  result.pose = observed.pose;
-  if (result.status != NoiseCalibrationStatus::Ok)
-    return result;
+  std::vector<PosePlanes> planes;
+  for (const PoseFrames& pose : poses) {
+    planes.push_back(findPosePlanes(pose, options));
+    if (const auto status = planes.back().status;
+        status != NoiseCalibrationStatus::Ok) {
+      PatternCalibration result;
+      result.status = status;
+      result.pose = static_cast<int>(planes.size()) - 1;
+      result.poses = static_cast<int>(poses.size());
+      return result;
+    }
+  }
+  return patternOn(std::move(planes));
+}
 
-  const BlockCorrelogram blocks = observed.blocks.finish();
-  const std::vector<CellSums> cells =
-      joined(contrastSums(observed.images), blocks.cells);
+PatternCalibration
+patternOn(std::vector<PosePlanes> poses)
+{
+  PatternCalibration result;
+  result.status = NoiseCalibrationStatus::Ok;
+  result.poses = static_cast<int>(poses.size());
+  BlockCorrelogramBuilder builder;
+  std::vector<PlaneImages> images;
+  for (PosePlanes& pose : poses) {
+    for (const Region& plane : pose.regions)
+      builder.add(pose.tiles, plane);
+    images.push_back(std::move(pose.images));
+  }
+  const BlockCorrelogram blocks = builder.finish();
+  const std::vector<CellSums> cells = joined(contrastSums(images), blocks.cells);
   result.rows = rowsOf(cells);
   result.distant = distantRowsOf(cells, blocks);
   Eigen::ArrayXd distances(kDifferences);
   for (Eigen::Index a = 0; a < kDifferences; ++a)
     distances[a] = distanceOf(a);
   const PatternDesign design(distances, blocks);
-  PatternFit fit(cells, design, largestArea(observed.images));
+  PatternFit fit(cells, design, largestArea(images));
   std::size_t waves = 2;
   fit.fit(waves);
   while (!fit.hasOnlyWaves())

@@ -24,9 +24,10 @@ struct PatternMapCalibration {
   /// leave of the mean disparity, px.
   double before_px = 0.0;
   double after_px = 0.0; ///< the same less the map of the other poses
-  /// The frames of each pose less the map of the others: calibratePattern() of these
-  /// measures what is left in a frame the map has not seen.
-  std::vector<PoseFrames> rest;
+  /// What calibratePattern() finds in each pose less the map of the others: the pattern
+  /// that is left in a frame the map has not seen. Without what poses share, since each
+  /// is a part of the maps that the others were judged by.
+  PatternCalibration left;
 };
 
 /// Robust smoothed mean over the poses of what least-squares planes leave of the

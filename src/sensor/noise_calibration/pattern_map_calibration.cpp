@@ -287,6 +287,7 @@ calibratePatternMap(const std::vector<PoseFrames>& poses,
   if (poses.size() < 2)
     throw std::invalid_argument("a pattern map wants two poses or more");
   PatternMapCalibration result;
+  std::vector<std::vector<Region>> planes_of;
   PoseResiduals residuals(poses.front().front().width, poses.front().front().height);
   for (const PoseFrames& pose : poses) {
     const PosePlanes planes = findPosePlanes(pose, options);
@@ -294,6 +295,7 @@ calibratePatternMap(const std::vector<PoseFrames>& poses,
     if (planes.status != NoiseCalibrationStatus::Ok)
       return result;
     residuals.add(residualsOf(planes.images, planes.regions.size()));
+    planes_of.push_back(planes.regions);
     ++result.pose;
   }
   result.pose = 0;
@@ -301,11 +303,16 @@ calibratePatternMap(const std::vector<PoseFrames>& poses,
   chooseMap(residuals, result);
   if (!result.map)
     return result;
-  for (std::size_t p = 0; p < poses.size(); ++p)
-    result.rest.push_back(lessMap(
-        poses[p],
-        residuals.map(static_cast<int>(p), result.smoothing_px, result.shrinkage),
-        options));
+  std::vector<PosePlanes> left;
+  for (std::size_t p = 0; p < poses.size(); ++p) {
+    const PatternMap others =
+        residuals.map(static_cast<int>(p), result.smoothing_px, result.shrinkage);
+    left.push_back(onPlanes(lessMap(poses[p], others, options), planes_of[p], options));
+  }
+  result.left = patternOn(std::move(left));
+  result.left.shared_part = {};
+  for (PatternRow& row : result.left.rows)
+    row.between_poses = {};
   return result;
 }
 

@@ -27,6 +27,19 @@ findPosePlanes(const PoseFrames& pose, const NoiseCalibrationOptions& options)
   return found;
 }
 
+PosePlanes
+onPlanes(const PoseFrames& pose,
+         const std::vector<Region>& planes,
+         const NoiseCalibrationOptions& options)
+{
+  PosePlanes found;
+  const DisparityStack stack(pose, options);
+  found.tiles = stack.tiles(pose, options);
+  found.regions = planes;
+  found.images = planeImages(stack, found.tiles, planes);
+  return found;
+}
+
 void
 requireSameSizes(const std::vector<PoseFrames>& poses)
 {

@@ -22,6 +22,14 @@ struct PosePlanes {
 PosePlanes findPosePlanes(const PoseFrames& pose,
                           const NoiseCalibrationOptions& options);
 
+/// The same frames with less noise on planes that were found before.
+PosePlanes onPlanes(const PoseFrames& pose,
+                    const std::vector<Region>& planes,
+                    const NoiseCalibrationOptions& options);
+
+/// What calibratePattern() finds on the planes of all poses, each of them Ok.
+PatternCalibration patternOn(std::vector<PosePlanes> poses);
+
 /// \throw std::invalid_argument when there is no pose, one has no frame, or their sizes
 /// differ.
 void requireSameSizes(const std::vector<PoseFrames>& poses);
