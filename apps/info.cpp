@@ -82,8 +82,13 @@ factsAbout(const std::string& path, const InputOptions& input, const Sensor& sen
 {
   CloudFacts facts;
   facts.path = path;
-  const RangeCloud cloud = loadCloud(path, loadOptions(input, sensor), &facts.file);
+  const RangeCloud raw = loadCloud(path, loadOptions(input, sensor), &facts.file);
   facts.file.notices = inputNotices(input, facts.file);
+  const std::size_t notices = facts.file.notices.size();
+  const Sensor taken_by = matchedSensor(sensorOf(facts.file, sensor), raw);
+  const RangeCloud cloud = withoutPatternMap(path, raw, taken_by, facts.file.notices);
+  if (sensor.pattern_map && facts.file.notices.size() == notices)
+    facts.file.notices.push_back("less the pattern map of the sensor " + sensor.name);
   facts.width = static_cast<int>(cloud.points->width);
   facts.height = static_cast<int>(cloud.points->height);
   facts.valid = countValidPoints(cloud);

@@ -4,6 +4,7 @@
 
 #include <holdfast/io/config.h>
 #include <holdfast/io/names.h>
+#include <holdfast/pcl/pattern_subtraction.h>
 
 #include <CLI/CLI.hpp>
 #include <Eigen/Geometry>
@@ -206,8 +207,8 @@ addNoPatternOption(CLI::App& command, bool& no_pattern)
       .add_flag("--no-pattern",
                 no_pattern,
                 "Take the errors of neighbouring pixels as independent, whatever the "
-                "sensor file says: as the paper does, and on a real camera too sure by "
-                "a factor of 3 to 12")
+                "sensor file says, and subtract no map of them: as the paper does, and "
+                "on a real camera too sure by a factor of 3 to 12")
       ->group("Input");
 }
 
@@ -265,6 +266,24 @@ loadOptions(const InputOptions& options, const Sensor& sensor)
   load.min_range_m = sensor.min_range_m;
   load.max_range_m = sensor.max_range_m;
   return load;
+}
+
+RangeCloud
+withoutPatternMap(const std::string& path,
+                  const RangeCloud& cloud,
+                  const Sensor& sensor,
+                  std::vector<std::string>& notices)
+{
+  std::string notice;
+  try {
+    RangeCloud rest = subtractPatternMap(cloud, sensor, &notice);
+    if (!notice.empty())
+      notices.push_back(notice);
+    return rest;
+  }
+  catch (const std::runtime_error& error) {
+    throw std::runtime_error(path + ": " + error.what());
+  }
 }
 
 std::vector<std::string>

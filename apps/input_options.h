@@ -51,6 +51,14 @@ Sensor sensorOf(const CloudFileInfo& info, const Sensor& nominal);
 
 LoadOptions loadOptions(const InputOptions& options, const Sensor& sensor);
 
+/// The cloud of a file less the sensor's pattern map, if it has one.
+/// \param notices receives a line where the map is not subtracted.
+/// \throw std::runtime_error "FILE: cause" as subtractPatternMap().
+RangeCloud withoutPatternMap(const std::string& path,
+                             const RangeCloud& cloud,
+                             const Sensor& sensor,
+                             std::vector<std::string>& notices);
+
 /// What the user should know about the file and how it was read, one line each.
 std::vector<std::string> inputNotices(const InputOptions& options,
                                       const CloudFileInfo& info);

@@ -2,6 +2,7 @@
 #include <holdfast/io/cloud_io.h>
 #include <holdfast/io/config.h>
 #include <holdfast/patch/parameters.h>
+#include <holdfast/pcl/pattern_subtraction.h>
 #include <holdfast/sensor/names.h>
 #include <holdfast/simulation/simulator.h>
 #include <holdfast/version.h>
@@ -183,11 +184,33 @@ save(const std::string& output, const RangeCloud& cloud, bool ascii, const Json&
   }
 }
 
+/// The camera adds what subtractPatternMap() takes away: a cloud with covariances of
+/// its own stays as it is. After any rounding, so that what is left is in whole steps.
+RangeCloud
+withPatternMap(const RangeCloud& cloud, const Sensor& sensor, double noise_scale)
+{
+  if (!sensor.pattern_map)
+    return cloud;
+  std::vector<float> errors = sensor.pattern_map->errors();
+  for (float& error : errors)
+    error *= -static_cast<float>(noise_scale);
+  Sensor opposite = sensor;
+  opposite.pattern_map = std::make_shared<const PatternMap>(sensor.camera.width,
+                                                            sensor.camera.height,
+                                                            errors);
+  return subtractPatternMap(cloud, opposite);
+}
+
 void
 runSimulate(const SimulateArguments& arguments)
 {
   const Sensor named = loadSensor(arguments.sensor);
   const Sensor sensor = arguments.no_pattern ? withoutPattern(named) : named;
+  if (sensor.pattern_map && arguments.stride > 1)
+    throw CLI::ValidationError("--stride",
+                               "sensor " + sensor.name +
+                                   " has a pattern map of all its pixels; --no-pattern "
+                                   "simulates without it");
   if (arguments.simulation.quantize && sensor.disparity_quantum_px == 0.0)
     throw CLI::ValidationError("--quantize",
                                "sensor " + sensor.name + " has no disparity quantum");
@@ -203,7 +226,9 @@ runSimulate(const SimulateArguments& arguments)
                              scene.name + " lies within the range of sensor " +
                              sensor.name);
   save(arguments.output,
-       toCloud(image, arguments.covariance),
+       withPatternMap(toCloud(image, arguments.covariance),
+                      sensor,
+                      arguments.simulation.noise_scale),
        arguments.ascii,
        truthJson(arguments,
                  scene,

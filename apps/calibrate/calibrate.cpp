@@ -10,6 +10,7 @@
 #endif
 
 #include <holdfast/io/atomic_file.h>
+#include <holdfast/io/pattern_map_file.h>
 #include <holdfast/pcl/intrinsics.h>
 #include <holdfast/version.h>
 
@@ -34,7 +35,8 @@ with time and how much is a fixed pattern of the camera, which no averaging remo
 What neighbouring pixels share of their error, waves of some length over the image, is
 measured on planes and written as the sensor's `pattern`. The shape of the surfaces is
 part of it, unless frames from other places, --pose, tell them apart: the pattern stays
-with the pixels. Planes should fill most of the picture.
+with the pixels, and --map takes it down pixel by pixel, to be subtracted. Planes
+should fill most of the picture.
 
 Examples:
   holdfast calibrate --device 1                          how large is the noise?
@@ -43,6 +45,7 @@ Examples:
   holdfast fit cloud.pcd --sensor mine.yaml              and now use it
   holdfast calibrate frames/ --plot noise.svg --json noise.json
   holdfast calibrate first/ --pose second/ --pose third/ -o mine.yaml
+  holdfast calibrate first/ --pose second/ --map mine.png -o mine.yaml
 )";
 
 struct CalibrateSettings {
@@ -54,6 +57,7 @@ struct CalibrateSettings {
 #endif
   int region_px = 0;
   std::string sensor_path; ///< empty: none
+  std::string map_path; ///< empty: none
   std::string plot_path; ///< empty: none
   std::string json_path; ///< empty: none; "-": standard output
   bool quiet = false; ///< errors only
@@ -178,11 +182,13 @@ loadRecording(const CalibrateSettings& settings, const Sensor& nominal)
 NoiseReport
 calibrate(const Recording& recording, const CalibrateSettings& settings)
 {
-  const NoiseReport report = measureNoise(
+  NoiseReport report = measureNoise(
       recording.poses(),
       recording.sensor(),
       settings.region_px,
       [&](int pose) { return recording.name(static_cast<std::size_t>(pose)); });
+  if (!settings.map_path.empty())
+    measurePatternMap(recording.poses(), report);
   if (!recording.notice().empty() && !settings.quiet)
     printNotice(recording.notice());
   return report;
@@ -246,8 +252,10 @@ runCalibrate(const CalibrateSettings& settings)
   if (!found)
     return 1;
   const NoiseReport& report = *found;
+  if (report.hasMap())
+    savePatternMap(settings.map_path, *report.map.map);
   if (!settings.sensor_path.empty())
-    saveCalibratedSensor(settings.sensor_path, report);
+    saveCalibratedSensor(settings.sensor_path, report, settings.map_path);
   if (settings.json_path == "-")
     std::cout << noiseReportJson(report).dump(2) << std::endl;
   else if (!settings.quiet)
@@ -274,6 +282,14 @@ requireSvg(const std::string& path)
 }
 
 std::string
+requirePng(const std::string& path)
+{
+  return std::filesystem::path(path).extension() == ".png" ?
+             "" :
+             path + ": the map is written as PNG; name it *.png";
+}
+
+std::string
 requireRegion(const std::string& text)
 {
   const auto size = parseNumber<int>(text);
@@ -289,6 +305,16 @@ addOutputOptions(CLI::App& command, CalibrateSettings& settings)
                   settings.sensor_path,
                   "Write a sensor file with the measured noise, for --sensor")
       ->type_name("SENSOR.yaml")
+      ->group(group);
+  command
+      .add_option("--map",
+                  settings.map_path,
+                  "Make a map of the fixed pattern from all poses, a 16-bit PNG that "
+                  "the sensor file names and fit, live and info subtract; the pattern "
+                  "is what is left then")
+      ->check(CLI::Validator(requirePng, "FILE.png"))
+      ->type_name("")
+      ->needs("--pose")
       ->group(group);
   command
       .add_option("--plot",

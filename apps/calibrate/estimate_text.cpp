@@ -30,9 +30,10 @@ valueText(const Estimate& estimate)
 std::string
 intervalText(const Estimate& estimate)
 {
-  return std::isfinite(estimate.low) ?
-             digits(estimate.low) + " to " + digits(estimate.high) :
-             "-";
+  if (!std::isfinite(estimate.low))
+    return "-";
+  return digits(estimate.low) +
+         (std::isinf(estimate.high) ? " or more" : " to " + digits(estimate.high));
 }
 
 std::string

@@ -332,6 +332,8 @@ commentsOf(const NoiseReport& report)
         comments["noise.sigma_disparity_px"];
     comments["noise.pattern"] = patternComment(report);
   }
+  if (report.hasMap() && !report.hasPattern()) // else said there
+    comments["noise.pattern_map"] = patternMapSentence(report);
   comments["noise.sigma_point_px"] =
       found.sigma_point.isKnown() ?
           "Scatter across the rays: " + valueAndInterval(found.sigma_point) + "." :
@@ -362,6 +364,39 @@ requireOk(NoiseCalibrationStatus status, const std::string& frames)
   }
 }
 
+std::vector<PoseFrames>
+imagesOf(const std::vector<std::vector<RangeCloud>>& poses)
+{
+  std::vector<PoseFrames> images;
+  for (const std::vector<RangeCloud>& pose : poses) {
+    PoseFrames& frames = images.emplace_back();
+    for (const RangeCloud& cloud : pose)
+      frames.push_back(toPointImage(cloud));
+  }
+  return images;
+}
+
+NoiseCalibrationOptions
+optionsFor(const Sensor& sensor)
+{
+  NoiseCalibrationOptions options;
+  options.camera = sensor.camera;
+  options.baseline_m = sensor.baseline_m;
+  options.focal_px = sensor.disparity_focal_px;
+  return options;
+}
+
+/// As seen from the folder of the sensor file, so that both can move together.
+std::string
+mapNameFor(const std::string& sensor_path, const std::string& map_path)
+{
+  namespace fs = std::filesystem;
+  if (map_path.empty())
+    return "";
+  return fs::proximate(fs::absolute(map_path), fs::absolute(sensor_path).parent_path())
+      .string();
+}
+
 } // namespace
 
 NoiseReport
@@ -370,19 +405,12 @@ measureNoise(const std::vector<std::vector<RangeCloud>>& poses,
              int region_px,
              const std::function<std::string(int pose)>& poseName)
 {
-  std::vector<PoseFrames> images;
-  for (const std::vector<RangeCloud>& pose : poses) {
-    PoseFrames& frames = images.emplace_back();
-    for (const RangeCloud& cloud : pose)
-      frames.push_back(toPointImage(cloud));
-  }
+  const std::vector<PoseFrames> images = imagesOf(poses);
   const PoseFrames& frames = images.front();
-  NoiseCalibrationOptions options;
-  options.camera = sensor.camera;
-  options.baseline_m = sensor.baseline_m;
-  options.focal_px = sensor.disparity_focal_px;
+  NoiseCalibrationOptions options = optionsFor(sensor);
   options.region_px = region_px;
-  NoiseReport report{calibrateNoise(frames, options), {}, sensor};
+  NoiseReport report{calibrateNoise(frames, options), {}, {}, sensor};
+  report.sensor.pattern_map.reset(); // the frames were not corrected by it
   report.sensor.camera.width = frames.front().width;
   report.sensor.camera.height = frames.front().height;
   requireOk(report.found.status, poseName(0));
@@ -390,6 +418,21 @@ measureNoise(const std::vector<std::vector<RangeCloud>>& poses,
   if (report.pattern.pose > 0)
     requireOk(report.pattern.status, poseName(report.pattern.pose));
   return report;
+}
+
+void
+measurePatternMap(const std::vector<std::vector<RangeCloud>>& poses,
+                  NoiseReport& report)
+{
+  const NoiseCalibrationOptions options = optionsFor(report.sensor);
+  report.map = calibratePatternMap(imagesOf(poses), options);
+  if (!report.hasMap())
+    throw std::runtime_error("no pixel saw a plane from two poses, so that no map of "
+                             "the pattern can be made");
+  const Estimate shared_part = report.pattern.shared_part;
+  report.pattern = report.map.left;
+  report.pattern.shared_part = shared_part;
+  report.sensor.pattern_map = report.map.map;
 }
 
 std::string
@@ -436,6 +479,7 @@ noiseReportJson(const NoiseReport& report)
           {"sigma_point_px", estimateJson(found.sigma_point)},
           {"depth_exponent", estimateJson(found.depth_exponent)},
           {"pattern", patternJson(report)},
+          {"pattern_map", patternMapJson(report)},
           {"by_region_size", sizes},
           {"by_depth", depths},
           {"remarks", sentences(report)}};
@@ -453,14 +497,18 @@ noiseReportPlot(const NoiseReport& report)
 }
 
 void
-saveCalibratedSensor(const std::string& path, const NoiseReport& report)
+saveCalibratedSensor(const std::string& path,
+                     const NoiseReport& report,
+                     const std::string& map_path)
 {
   const NoiseCalibration& found = report.found;
   Sensor sensor = report.sensor;
   StereoNoiseModel::Parameters noise;
   sensor.pattern = roundedPattern(report);
-  noise.sigma_disparity_px = rounded(
-      (report.hasPattern() ? report.pattern.single : found.sigmas.single).value);
+  noise.sigma_disparity_px =
+      rounded((report.hasPattern() || report.hasMap() ? report.pattern.single :
+                                                        found.sigmas.single)
+                  .value);
   // Rounding must not make the whole less than its part.
   noise.sigma_disparity_px =
       std::max(noise.sigma_disparity_px, std::sqrt(sensor.pattern.variance()));
@@ -479,7 +527,8 @@ saveCalibratedSensor(const std::string& path, const NoiseReport& report)
               {"sigma_point_px", noise.sigma_point_px},
               {"baseline_m", noise.baseline_m},
               {"focal_px", noise.focal_px}},
-             commentsOf(report));
+             commentsOf(report),
+             mapNameFor(path, map_path));
 }
 
 } // namespace holdfast::app

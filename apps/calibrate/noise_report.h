@@ -6,6 +6,7 @@
 #include <holdfast/pcl/range_cloud.h>
 #include <holdfast/sensor/noise_calibration.h>
 #include <holdfast/sensor/pattern_calibration.h>
+#include <holdfast/sensor/pattern_map_calibration.h>
 #include <holdfast/sensor/sensor.h>
 
 #include <nlohmann/json.hpp>
@@ -18,8 +19,15 @@ namespace holdfast::app {
 
 struct NoiseReport {
   NoiseCalibration found; ///< in the first pose
-  PatternCalibration pattern; ///< in all; not Ok where the first has only small spots
+  /// In all; not Ok where the first has only small spots. With a map, of what is left.
+  PatternCalibration pattern;
+  PatternMapCalibration map; ///< without a map: not asked for
   Sensor sensor; ///< the one assumed, with the camera of the frames
+
+  bool hasMap() const
+  {
+    return map.map != nullptr;
+  }
 
   /// Whether neighbouring pixels share anything.
   bool hasPattern() const
@@ -38,6 +46,11 @@ NoiseReport measureNoise(const std::vector<std::vector<RangeCloud>>& poses,
                          int region_px,
                          const std::function<std::string(int pose)>& poseName);
 
+/// Makes a pattern map from two or more poses, too, and measures the pattern that is
+/// left without it. \throw std::runtime_error when no pixel saw planes from two.
+void measurePatternMap(const std::vector<std::vector<RangeCloud>>& poses,
+                       NoiseReport& report);
+
 /// Tables and what they mean.
 std::string noiseReportText(const NoiseReport& report);
 
@@ -50,6 +63,9 @@ Plot noiseReportPlot(const NoiseReport& report);
 
 /// A sensor file with the measured noise and where each figure came from. The sensor is
 /// named after the file.
-void saveCalibratedSensor(const std::string& path, const NoiseReport& report);
+/// \param map_path of the report's pattern map, written before; empty without.
+void saveCalibratedSensor(const std::string& path,
+                          const NoiseReport& report,
+                          const std::string& map_path);
 
 } // namespace holdfast::app

@@ -26,13 +26,13 @@ shapeText(const WaveEstimate& wave)
   return std::string(kPatternShapeNames.of(wave.shape));
 }
 
-/// A length without an interval was cut off.
+/// Whether a length or its interval was cut off.
 bool
 hasCutOffWave(const NoiseReport& report)
 {
   const auto& waves = report.pattern.waves;
   return std::any_of(waves.begin(), waves.end(), [](const WaveEstimate& wave) {
-    return !std::isfinite(wave.length.high);
+    return std::isinf(wave.length.high);
   });
 }
 
@@ -44,7 +44,9 @@ poseSentence(const NoiseReport& report)
            "Frames from another place, as --pose, tell how much belongs to the camera.";
   return std::to_string(report.pattern.poses) +
          " poses: " + valueAndInterval(report.pattern.shared_part) +
-         " of the variance between points 8 to 75 px apart is in the same pixels of "
+         " of the variance between points 8 to 75 px apart" +
+         (report.hasMap() ? ", before the map," : "") +
+         " is in the same pixels of "
          "other poses and belongs to the camera; the rest changes with time or "
          "distance, or is the shape of the surfaces.";
 }
@@ -149,13 +151,19 @@ patternSentences(const NoiseReport& report)
 {
   if (!isMeasured(report))
     return {"Without a plane it cannot be told what neighbouring pixels share."};
-  if (!report.hasPattern())
-    return {"Neighbouring pixels share nothing that is seen: their errors are "
-            "independent."};
-  std::vector<std::string> sentences{poseSentence(report)};
+  std::vector<std::string> sentences;
+  if (report.hasMap())
+    sentences.push_back(patternMapSentence(report));
+  if (!report.hasPattern()) {
+    sentences.emplace_back(
+        "Neighbouring pixels share nothing that is seen: their errors are "
+        "independent.");
+    return sentences;
+  }
+  sentences.push_back(poseSentence(report));
   if (hasCutOffWave(report))
-    sentences.emplace_back("The long wave is at least as long as the planes can tell; "
-                           "it stands for all that is longer.");
+    sentences.emplace_back("The long wave may be longer than the planes can tell: its "
+                           "length is cut off, and it stands for all that is longer.");
   return sentences;
 }
 
@@ -187,6 +195,35 @@ patternJson(const NoiseReport& report)
           {"shared_part", estimateJson(pattern.shared_part)},
           {"second_differences_px2", differences},
           {"block_covariances_px2", blocks}};
+}
+
+std::string
+patternMapSentence(const NoiseReport& report)
+{
+  const PatternMapCalibration& map = report.map;
+  if (!report.hasMap())
+    return "";
+  return "The map of the fixed pattern knows " +
+         formatNumber("%.0f", 100.0 * map.known_part) +
+         " % of the pixels. The map of the other poses takes what the planes of one "
+         "leave from " +
+         formatNumber("%.3f to ", map.before_px) +
+         formatNumber("%.3f px rms, the pixels seen by two or more; the pattern is ",
+                      map.after_px) +
+         "what is left then.";
+}
+
+Json
+patternMapJson(const NoiseReport& report)
+{
+  if (!report.hasMap())
+    return nullptr;
+  const PatternMapCalibration& map = report.map;
+  return {{"known_part", map.known_part},
+          {"smoothing_px", map.smoothing_px},
+          {"shrinkage", map.shrinkage},
+          {"rms_before_px", map.before_px},
+          {"rms_after_px", map.after_px}};
 }
 
 std::vector<Panel>

@@ -16,6 +16,12 @@ std::vector<std::string> patternSentences(const NoiseReport& report);
 /// Null where there was no plane.
 nlohmann::ordered_json patternJson(const NoiseReport& report);
 
+/// What the map is worth. Empty without one.
+std::string patternMapSentence(const NoiseReport& report);
+
+/// Null without a map.
+nlohmann::ordered_json patternMapJson(const NoiseReport& report);
+
 /// Over the distance of the pixels, short and long, with the fitted curves; none where
 /// there was no plane.
 std::vector<Panel> patternPanels(const NoiseReport& report);

@@ -88,6 +88,7 @@ loadRecording(const std::string& path,
     notices.push_back(notice);
   if (!recording.cloud.covariances.empty())
     notices.emplace_back("its own covariances count, and no pattern");
+  recording.cloud = withoutPatternMap(path, recording.cloud, recording.sensor, notices);
   for (const std::string& line : notices)
     remarks.push_back(recording.name + ": " + line);
   const auto plane = findLargestPlane(recording.cloud, recording.sensor, seed);

@@ -155,6 +155,7 @@ loadInput(const std::string& path, const Sensor& nominal, const FitSettings& set
     input.notices.push_back(notice);
   if (settings.sigma_m > 0.0)
     input.sensor = withConstantNoise(input.sensor, settings.sigma_m);
+  input.cloud = withoutPatternMap(path, input.cloud, input.sensor, input.notices);
   return input;
 }
 

@@ -12,6 +12,7 @@
 #include "recording.h"
 
 #include <holdfast/pcl/frame_extraction.h>
+#include <holdfast/pcl/pattern_subtraction.h>
 
 #include <CLI/CLI.hpp>
 
@@ -145,6 +146,10 @@ LiveSession::LiveSession(const LiveSettings& settings, Openni2Grabber& grabber)
 , sensor_(withCamera(sensorOf(settings), grabber.camera()))
 , extractor_(sensor_, settings.extraction.options)
 {
+  const Camera& camera = sensor_.camera;
+  if (const std::string error = patternMapError(sensor_, camera.width, camera.height);
+      !error.empty())
+    throw std::runtime_error("frames of " + error);
   if (!settings.output_folder.empty())
     makeFrameFolder(settings.output_folder);
   if (settings.view)
@@ -162,7 +167,7 @@ LiveSession::process(const RangeFrame::ConstPtr& frame)
     recording_->push(frame);
   PatchReport report;
   const Stopwatch watch;
-  report.result = extractor_.extract(frame->cloud);
+  report.result = extractor_.extract(subtractPatternMap(frame->cloud, sensor_));
   report.fit_ms = watch.milliseconds();
   statistics_.addFrame(frame->received, report.result.patches);
   if (view_)

@@ -6,8 +6,10 @@
 
 #include <holdfast/geometry/constants.h>
 #include <holdfast/io/atomic_file.h>
+#include <holdfast/io/cloud_io.h>
 #include <holdfast/io/patch_io.h>
 #include <holdfast/patch/tessellation.h>
+#include <holdfast/pcl/intrinsics.h>
 #include <holdfast/simulation/reference_scenes.h>
 
 #include <pcl/common/point_tests.h>
@@ -166,7 +168,13 @@ loadSubject(const std::string& result, const RenderSettings& settings)
       settings.cloud.empty() ? findCloud(result, report.cloud) : settings.cloud;
   const Sensor sensor = loadSensorOption(settings.input.sensor_name);
   CloudFileInfo info;
-  const RangeCloud cloud = loadCloud(path, loadOptions(settings.input, sensor), &info);
+  const RangeCloud raw = loadCloud(path, loadOptions(settings.input, sensor), &info);
+  std::vector<std::string> notices;
+  const RangeCloud cloud =
+      withoutPatternMap(path, raw, matchedSensor(sensorOf(info, sensor), raw), notices);
+  for (const std::string& notice : notices)
+    if (!settings.quiet)
+      printNotice(path + ": " + notice);
 
   Subject subject;
   subject.patches = report.result.patches;

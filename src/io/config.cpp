@@ -1,6 +1,7 @@
 #include "one_line.h"
 #include <holdfast/io/atomic_file.h>
 #include <holdfast/io/config.h>
+#include <holdfast/io/pattern_map_file.h>
 #include <holdfast/sensor/names.h>
 #include <holdfast/sensor/noise_registry.h>
 #include <holdfast/sensor/parameter_error.h>
@@ -292,6 +293,35 @@ readPattern(Section& section, const NoiseModel& noise)
   return pattern;
 }
 
+/// The file is named as seen from the folder of the sensor file.
+std::shared_ptr<const PatternMap>
+readPatternMap(Section& section, const std::string& sensor_file, const Sensor& sensor)
+{
+  if (!section.has("pattern_map"))
+    return nullptr;
+  const std::string name = section.text("pattern_map");
+  if (sensor.noise->name() != "stereo")
+    section.fail("pattern_map",
+                 "is of disparities, which the noise model " + sensor.noise->name() +
+                     " does not have");
+  const fs::path path = fs::path(sensor_file).parent_path() / name;
+  try {
+    auto map = std::make_shared<const PatternMap>(loadPatternMap(path.string()));
+    if (map->width() != sensor.camera.width || map->height() != sensor.camera.height)
+      throw std::runtime_error(fmt::format("{}: {} x {} pixels, where the camera has "
+                                           "{} x {}",
+                                           path.string(),
+                                           map->width(),
+                                           map->height(),
+                                           sensor.camera.width,
+                                           sensor.camera.height));
+    return map;
+  }
+  catch (const std::runtime_error& error) {
+    section.fail("pattern_map", std::string("is of no use: ") + error.what());
+  }
+}
+
 /// \param shared values that the model may take from elsewhere in the file.
 NoiseModel::ConstPtr
 readNoiseModel(Section& section, const NoiseParameters& shared)
@@ -317,10 +347,14 @@ readNoiseModel(Section& section, const NoiseParameters& shared)
 }
 
 void
-readNoise(Section section, const NoiseParameters& shared, Sensor& sensor)
+readNoise(Section section,
+          const NoiseParameters& shared,
+          const std::string& file,
+          Sensor& sensor)
 {
   sensor.noise = readNoiseModel(section, shared);
   sensor.pattern = readPattern(section, *sensor.noise);
+  sensor.pattern_map = readPatternMap(section, file, sensor);
   section.rejectUnknown();
 }
 
@@ -338,7 +372,7 @@ readSensor(const YAML::Node& node, const std::string& file)
     shared = {{"baseline_m", sensor.baseline_m},
               {"focal_px", sensor.disparity_focal_px}};
   }
-  readNoise(root.section("noise"), shared, sensor);
+  readNoise(root.section("noise"), shared, file, sensor);
   root.rejectUnknown();
   return sensor;
 }
@@ -437,7 +471,10 @@ writePattern(SectionWriter& out, const Sensor& sensor)
 }
 
 void
-writeSensor(SectionWriter& out, const Sensor& sensor, const NoiseParameters& noise)
+writeSensor(SectionWriter& out,
+            const Sensor& sensor,
+            const NoiseParameters& noise,
+            const std::string& map_file)
 {
   out.entry("name", yamlText(sensor.name));
   out.begin("camera");
@@ -460,6 +497,8 @@ writeSensor(SectionWriter& out, const Sensor& sensor, const NoiseParameters& noi
   for (const auto& [name, value] : noise)
     out.entry(name, value);
   writePattern(out, sensor);
+  if (!map_file.empty())
+    out.entry("pattern_map", yamlText(map_file));
   out.finish();
 }
 
@@ -520,7 +559,8 @@ void
 saveSensor(const std::string& path,
            const Sensor& sensor,
            const NoiseParameters& noise,
-           const SensorComments& comments)
+           const SensorComments& comments,
+           const std::string& map_file)
 {
   const NoiseModel::ConstPtr model = // throws when they do not match
       makeNoiseModel(sensor.noise->name(), noise);
@@ -528,9 +568,11 @@ saveSensor(const std::string& path,
     throw std::invalid_argument(error);
   if (const std::string excess = excessOf(sensor.pattern, *model); !excess.empty())
     throw std::invalid_argument("pattern " + excess);
+  if (map_file.empty() != !sensor.pattern_map)
+    throw std::invalid_argument("a pattern map and its file go together");
   AtomicFile file(path);
   SectionWriter out(file.stream(), comments);
-  writeSensor(out, sensor, noise);
+  writeSensor(out, sensor, noise, map_file);
   file.commit();
 }
 

@@ -1,14 +1,16 @@
 #include <holdfast/sensor/pattern_calibration.h>
 
 #include "noise_calibration/contrasts.h"
-#include "noise_calibration/frames.h"
+#include "noise_calibration/pose_planes.h"
 #include "noise_calibration/wave_fit.h"
+
+#include <holdfast/geometry/constants.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 #include <stdexcept>
+#include <utility>
 
 namespace holdfast {
 namespace {
@@ -17,14 +19,14 @@ namespace {
 constexpr double kLeastTriples = 0.05;
 constexpr double kLeastPairs = 0.05;
 
-// Second differences are fitted over short distances; what is further apart, the blocks
-// tell with less uncertainty.
-constexpr double kLongestDifference = 24.0; // px
+// Two-sided 95 % of a normal distribution.
+constexpr double kNormal95 = 1.96;
 
 // Over shorter distances, what changes with time hides what poses share.
 constexpr double kLeastShared = 8.0; // px
 
-// A length as close to the longest that is searched was not found but cut off.
+// An interval that comes as close to the longest length that is searched is cut off
+// there.
 constexpr double kCutOff = 1e-3;
 
 constexpr int kReweightings = 3;
@@ -115,8 +117,10 @@ rowVariances(const std::vector<CellSums>& cells, const Eigen::ArrayXd& total)
       block_rows += 1.0;
       variances[a] = 1.0;
     }
-    if (a < kDifferences && distanceOf(a) <= kLongestDifference &&
-        counts[a] >= kLeastTriples * counts[0]) {
+    // The long ones, too, although blocks tell more of long waves: how bent a pattern
+    // makes a patch shows nowhere else, and one that fits at either end may be wrong by
+    // half between.
+    if (a < kDifferences && counts[a] >= kLeastTriples * counts[0]) {
       const Eigen::Vector2d terms(1.0, std::log(distanceOf(a)));
       A += terms * terms.transpose();
       b += 2.0 * std::log(error / mean.value) * terms;
@@ -131,37 +135,17 @@ rowVariances(const std::vector<CellSums>& cells, const Eigen::ArrayXd& total)
   return variances;
 }
 
-/// What all poses show on planes, or the pose that shows nothing.
-struct Observed {
-  NoiseCalibrationStatus status = NoiseCalibrationStatus::Ok;
-  int pose = 0;
-  std::vector<PlaneImages> images;
-  BlockCorrelogramBuilder blocks;
-};
-
-Observed
-observe(const std::vector<PoseFrames>& poses, const NoiseCalibrationOptions& options)
+/// Pixels on planes in the pose that has most of them.
+double
+largestArea(const std::vector<PlaneImages>& poses)
 {
-  Observed observed;
-  for (const PoseFrames& pose : poses) {
-    const DisparityStack stack(pose, options);
-    const TileImage tiles = stack.tiles(pose, options);
-    const FlatRegions flat = findFlatRegions(tiles, options);
-    if (!flat.are_planes) {
-      const bool is_static = std::any_of(tiles.tiles.begin(),
-                                         tiles.tiles.end(),
-                                         [](const Tile& tile) { return tile.usable; });
-      observed.status = is_static ? NoiseCalibrationStatus::NothingFlat :
-                                    NoiseCalibrationStatus::NothingStatic;
-      return observed;
-    }
-    observed.images.push_back(planeImages(stack, tiles, flat.regions));
-    for (const Region& plane : flat.regions)
-      observed.blocks.add(tiles, plane);
-    ++observed.pose;
-  }
-  observed.pose = 0;
-  return observed;
+  std::ptrdiff_t largest = 0;
+  for (const PlaneImages& pose : poses)
+    largest = std::max(largest,
+                       std::count_if(pose.plane.begin(),
+                                     pose.plane.end(),
+                                     [](std::int16_t plane) { return plane > 0; }));
+  return static_cast<double>(largest);
 }
 
 /// Sums by cell, those of the blocks behind those of the differences.
@@ -179,8 +163,11 @@ joined(std::vector<CellSums> cells, const std::vector<CellSums>& blocks)
 /// The fit of the whole and, by delete-one, what its numbers are uncertain by.
 class PatternFit {
 public:
-  PatternFit(const std::vector<CellSums>& cells, const PatternDesign& design)
-  : cells_(cells), design_(design)
+  /// \param area of the planes in one pose, px^2.
+  PatternFit(const std::vector<CellSums>& cells,
+             const PatternDesign& design,
+             double area)
+  : cells_(cells), design_(design), area_(area)
   {
     total_ = Eigen::ArrayXd::Zero(cells.front().sums.size());
     for (const CellSums& cell : cells)
@@ -189,28 +176,18 @@ public:
     weigh(meansOf(total_));
   }
 
-  /// The better of the shapes.
-  void fit(const std::vector<std::vector<PatternShape>>& candidates)
+  /// Exponential waves, unless a Gaussian last one is clearly better. Within a patch a
+  /// Gaussian wave is nearly plane and an exponential one rough: where the data do not
+  /// tell, the latter promises less.
+  void fit(std::size_t waves)
   {
-    const PatternData changes = changesOf(total_);
-    if (!hasFrames(total_))
-      temporal_ = {};
-    else
-      temporal_ = fitWaves(design_, changes, {PatternShape::Exponential});
-    std::optional<WaveFit> best;
-    for (int round = 0; round < kReweightings; ++round) {
-      best.reset();
-      for (const auto& shapes : candidates) {
-        WaveFit tried = fitWaves(design_, aboveFloor(total_, temporal_.white), shapes);
-        if (!best || tried.error < best->error)
-          best = std::move(tried);
-      }
-      weigh(temporal_.white * design_.white() + best->expected(design_));
-    }
-    fit_ = *best;
-    estimates_ = jackknifeAll(cells_, [&](const Eigen::ArrayXd& sums) {
-      return numbersOf(sums);
-    });
+    std::vector<PatternShape> shapes(waves, PatternShape::Exponential);
+    fitShapes(shapes);
+    if (waves == 0)
+      return;
+    shapes.back() = PatternShape::Gaussian;
+    if (isClearlyBetter(shapes))
+      fitShapes(shapes);
   }
 
   bool hasOnlyWaves() const
@@ -224,11 +201,17 @@ public:
 
   void write(PatternCalibration& result) const
   {
-    result.single = rootOf(estimates_[0]);
+    double square = 0.0;
+    for (std::size_t m = 0; m < waves(); ++m)
+      square += std::pow(samplingError(m) * estimates_[2 + m].value, 2);
+    result.single = rootOf(widened(estimates_[0], std::sqrt(square)));
     result.white = rootOf(estimates_[1]);
     for (std::size_t m = 0; m < waves(); ++m) {
-      result.waves.push_back({rootOf(estimates_[2 + m]),
-                              lengthOf(estimates_[2 + waves() + m]),
+      const double error = samplingError(m);
+      const Estimate& variance = estimates_[2 + m];
+      const Estimate& log_length = estimates_[2 + waves() + m];
+      result.waves.push_back({rootOf(widened(variance, error * variance.value)),
+                              lengthOf(widened(log_length, lengthError(m))),
                               fit_.shapes[m]});
     }
     result.shared_part = estimates_.back();
@@ -246,14 +229,75 @@ private:
     return fit_.shapes.size();
   }
 
+  void fitShapes(const std::vector<PatternShape>& shapes)
+  {
+    temporal_ = {};
+    if (hasFrames(total_))
+      temporal_ = fitWaves(design_, changesOf(total_), {PatternShape::Exponential});
+    for (int round = 0; round < kReweightings; ++round) {
+      fit_ = fitWaves(design_, aboveFloor(total_, temporal_.white), shapes);
+      weigh(temporal_.white * design_.white() + fit_.expected(design_));
+    }
+    estimates_ = jackknifeAll(cells_, [&](const Eigen::ArrayXd& sums) {
+      return numbersOf(sums);
+    });
+  }
+
+  /// Whether the misfit with these shapes is less than that of the fit by more than
+  /// their difference is uncertain by, with the weights of the fit for both.
+  bool isClearlyBetter(const std::vector<PatternShape>& shapes) const
+  {
+    const WaveFit other =
+        fitWaves(design_, aboveFloor(total_, temporal_.white), shapes);
+    const Estimate gain = jackknife(cells_, [&](const Eigen::ArrayXd& sums) {
+      const PatternData data = aboveFloor(sums, temporalOf(sums).white);
+      return refitWaves(design_, data, fit_).error -
+             refitWaves(design_, data, other).error;
+    });
+    return gain.low > 0.0;
+  }
+
+  /// What changes from frame to frame, near that of the whole.
+  WaveFit temporalOf(const Eigen::ArrayXd& sums) const
+  {
+    return hasFrames(sums) ? refitWaves(design_, changesOf(sums), temporal_) :
+                             WaveFit{};
+  }
+
+  /// Half the 95 % interval of a wave's variance, relative, for the number of its
+  /// pieces in the planes alone: the mean square over an area A has the relative
+  /// variance 2 / A times the integral of rho^2.
+  double samplingError(std::size_t m) const
+  {
+    const double length = std::exp(fit_.log_lengths[m]);
+    const double share = fit_.shapes[m] == PatternShape::Exponential ? 0.5 : 1.0;
+    return kNormal95 * std::sqrt(2.0 / area_ * share * kPi * length * length);
+  }
+
+  /// How steeply a wave begins is known well, sigma^2 / length of an exponential one
+  /// and sigma^2 / length^2 of a Gaussian: its length errs with its sigma.
+  double lengthError(std::size_t m) const
+  {
+    const bool exponential = fit_.shapes[m] == PatternShape::Exponential;
+    return (exponential ? 1.0 : 0.5) * samplingError(m);
+  }
+
+  /// The jackknife sees how the cells differ, but not that the waves all of them share
+  /// are few: in quadrature.
+  static Estimate widened(const Estimate& estimate, double half)
+  {
+    return {estimate.value,
+            estimate.value - std::hypot(estimate.value - estimate.low, half),
+            estimate.value + std::hypot(estimate.high - estimate.value, half)};
+  }
+
   static Estimate lengthOf(const Estimate& log_length)
   {
-    Estimate length;
-    length.value = std::exp(log_length.value);
-    if (length.value < (1.0 - kCutOff) * kLongestWave) {
-      length.low = std::exp(log_length.low);
-      length.high = std::exp(log_length.high);
-    }
+    Estimate length{std::exp(log_length.value),
+                    std::exp(log_length.low),
+                    std::exp(log_length.high)};
+    if (length.high >= (1.0 - kCutOff) * kLongestWave)
+      length.high = std::numeric_limits<double>::infinity();
     return length;
   }
 
@@ -298,8 +342,7 @@ private:
 
   Eigen::ArrayXd numbersOf(const Eigen::ArrayXd& sums) const
   {
-    const WaveFit temporal =
-        hasFrames(sums) ? refitWaves(design_, changesOf(sums), temporal_) : WaveFit{};
+    const WaveFit temporal = temporalOf(sums);
     const WaveFit fit = refitWaves(design_, aboveFloor(sums, temporal.white), fit_);
     // Long waves and their lengths are known together less well than that there are
     // any.
@@ -323,6 +366,7 @@ private:
 
   const std::vector<CellSums>& cells_;
   const PatternDesign& design_;
+  double area_;
   Eigen::ArrayXd total_;
   Eigen::ArrayXd variances_;
   Eigen::ArrayXd weights_;
@@ -361,21 +405,6 @@ distantRowsOf(const std::vector<CellSums>& cells, const BlockCorrelogram& blocks
   return rows;
 }
 
-void
-requireSameSizes(const std::vector<PoseFrames>& poses)
-{
-  if (poses.empty())
-    throw std::invalid_argument("there is no pose");
-  for (const PoseFrames& pose : poses) {
-    if (pose.empty())
-      throw std::invalid_argument("a pose has no frame");
-    requireSameSizes(pose);
-    if (pose.front().width != poses.front().front().width ||
-        pose.front().height != poses.front().front().height)
-      throw std::invalid_argument("the frames differ in size");
-  }
-}
-
 } // namespace
 
 NoisePattern
@@ -394,31 +423,47 @@ calibratePattern(const std::vector<PoseFrames>& poses,
   if (const std::string error = validityError(options); !error.empty())
     throw std::invalid_argument(error);
   requireSameSizes(poses);
-  const Observed observed = observe(poses, options);
-  PatternCalibration result;
-  result.poses = static_cast<int>(poses.size());
-  result.status = observed.status;
-  result.pose = observed.pose;
-  if (result.status != NoiseCalibrationStatus::Ok)
-    return result;
+  std::vector<PosePlanes> planes;
+  for (const PoseFrames& pose : poses) {
+    planes.push_back(findPosePlanes(pose, options));
+    if (const auto status = planes.back().status;
+        status != NoiseCalibrationStatus::Ok) {
+      PatternCalibration result;
+      result.status = status;
+      result.pose = static_cast<int>(planes.size()) - 1;
+      result.poses = static_cast<int>(poses.size());
+      return result;
+    }
+  }
+  return patternOn(std::move(planes));
+}
 
-  const BlockCorrelogram blocks = observed.blocks.finish();
-  const std::vector<CellSums> cells =
-      joined(contrastSums(observed.images), blocks.cells);
+PatternCalibration
+patternOn(std::vector<PosePlanes> poses)
+{
+  PatternCalibration result;
+  result.status = NoiseCalibrationStatus::Ok;
+  result.poses = static_cast<int>(poses.size());
+  BlockCorrelogramBuilder builder;
+  std::vector<PlaneImages> images;
+  for (PosePlanes& pose : poses) {
+    for (const Region& plane : pose.regions)
+      builder.add(pose.tiles, plane);
+    images.push_back(std::move(pose.images));
+  }
+  const BlockCorrelogram blocks = builder.finish();
+  const std::vector<CellSums> cells = joined(contrastSums(images), blocks.cells);
   result.rows = rowsOf(cells);
   result.distant = distantRowsOf(cells, blocks);
   Eigen::ArrayXd distances(kDifferences);
   for (Eigen::Index a = 0; a < kDifferences; ++a)
     distances[a] = distanceOf(a);
   const PatternDesign design(distances, blocks);
-  PatternFit fit(cells, design);
-  constexpr auto kExponential = PatternShape::Exponential;
-  constexpr auto kGaussian = PatternShape::Gaussian;
-  fit.fit({{kExponential, kGaussian}, {kExponential, kExponential}});
-  if (!fit.hasOnlyWaves())
-    fit.fit({{kExponential}, {kGaussian}});
-  if (!fit.hasOnlyWaves())
-    fit.fit({{}});
+  PatternFit fit(cells, design, largestArea(images));
+  std::size_t waves = 2;
+  fit.fit(waves);
+  while (!fit.hasOnlyWaves())
+    fit.fit(--waves);
   fit.write(result);
   return result;
 }

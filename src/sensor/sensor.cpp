@@ -23,6 +23,7 @@ Sensor
 withoutPattern(Sensor sensor)
 {
   sensor.pattern = {};
+  sensor.pattern_map.reset();
   return sensor;
 }
 
@@ -33,8 +34,7 @@ withConstantNoise(Sensor sensor, double sigma_m)
   name.imbue(std::locale::classic());
   name << "constant noise of " << 1e3 * sigma_m << " mm";
   sensor.name = name.str();
-  sensor.pattern = {}; // it belongs to the camera that this replaces
-  sensor.pattern = {};
+  sensor = withoutPattern(std::move(sensor)); // it belongs to the camera replaced
   sensor.noise = std::make_shared<const ConstantNoiseModel>(
       ConstantNoiseModel::Parameters{sigma_m, sigma_m});
   return sensor;

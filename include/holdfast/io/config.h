@@ -28,14 +28,18 @@ using SensorComments = std::map<std::string, std::string>;
 /// Writes a file from which loadSensor() makes the same sensor, to the last digit.
 ///
 /// \param noise the parameters that sensor.noise was made from, which it does not tell.
+/// \param map_file of sensor.pattern_map, as seen from the folder of `path`; it is not
+/// written here (savePatternMap). Empty for a sensor without.
 /// \throw std::invalid_argument when they do not suit its model, the pattern makes no
-/// sense or is more than the noise of a point, or a comment has no key to stand above.
+/// sense or is more than the noise of a point, a comment has no key to stand above, or
+/// map and file do not go together.
 /// \throw std::runtime_error when the file cannot be written; then there is none, or
 /// the one from before.
 void saveSensor(const std::string& path,
                 const Sensor& sensor,
                 const NoiseParameters& noise,
-                const SensorComments& comments = {});
+                const SensorComments& comments = {},
+                const std::string& map_file = {});
 
 /// Names of the built-in sensors, sorted.
 std::vector<std::string> listSensors();

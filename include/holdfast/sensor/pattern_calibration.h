@@ -26,7 +26,7 @@ using PoseFrames = std::vector<PointImage>;
 struct WaveEstimate {
   Estimate sigma;
   /// At most 80 px, half the distances compared: waves that are longer show there as
-  /// such ones, and have no interval.
+  /// such ones. An interval that reaches so far is open: its upper end is infinite.
   Estimate length;
   PatternShape shape = PatternShape::Exponential;
 };
@@ -51,7 +51,8 @@ struct DistantRow {
 
 /// All sigmas in px of disparity. Intervals are delete-one-cell jackknifes as those of
 /// NoiseCalibration, over 4 x 3 cells, since long waves reach across smaller ones. Few
-/// pieces of such waves are in an image: their intervals are wide.
+/// pieces of such waves are in an image: the intervals of sigmas and lengths are
+/// widened by what follows from their number.
 struct PatternCalibration {
   NoiseCalibrationStatus status = NoiseCalibrationStatus::NothingStatic;
   int pose = 0; ///< of which the status speaks
@@ -71,9 +72,11 @@ struct PatternCalibration {
 
 /// White part and waves that fit the mean squares of second differences best, by
 /// weighted least squares: none, one or two waves, as many as have variances whose 95 %
-/// intervals are above zero. Of two, the short one is exponential, and the shape of the
-/// other that which fits better. Where there are several frames, the white part is at
-/// least that of what changes between them.
+/// intervals are above zero. All are exponential, but the longest is Gaussian where
+/// that fits better by more than the difference is uncertain by: a Gaussian wave is
+/// nearly plane within a patch, and taken for granted promises more than the data show.
+/// Where there are several frames, the white part is at least that of what changes
+/// between them.
 ///
 /// \param poses with the pixels of all at the same places of the sensor. Only planes
 /// count: small flat spots are too small for long waves.

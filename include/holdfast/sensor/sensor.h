@@ -4,7 +4,9 @@
 #include <holdfast/noise_pattern.h>
 #include <holdfast/sensor/camera.h>
 #include <holdfast/sensor/noise_model.h>
+#include <holdfast/sensor/pattern_map.h>
 
+#include <memory>
 #include <string>
 
 namespace holdfast {
@@ -15,6 +17,9 @@ struct Sensor {
   NoiseModel::ConstPtr noise; ///< never null in a loaded sensor
   /// The part of that noise which neighbouring pixels share.
   NoisePattern pattern;
+  /// What is to be subtracted from its disparities before all that
+  /// (subtractPatternMap), with the noise model "stereo" only; null: nothing.
+  std::shared_ptr<const PatternMap> pattern_map;
   /// Depth range the sensor delivers, m.
   double min_range_m = 0.0;
   double max_range_m = 1e3;
@@ -31,11 +36,13 @@ struct Sensor {
 /// as large.
 Sensor withCamera(Sensor sensor, const Camera& camera);
 
-/// The sensor without its pattern: errors of neighbouring pixels count as independent.
+/// The sensor without its pattern: errors of neighbouring pixels count as independent,
+/// and no map of them is subtracted.
 Sensor withoutPattern(Sensor sensor);
 
-/// The sensor with the same noise for every point in every direction, without pattern,
-/// and a name that says so: for clouds that the sensor's model does not describe.
+/// The sensor with the same noise for every point in every direction, without pattern
+/// or map, and a name that says so: for clouds that the sensor's model does not
+/// describe.
 Sensor withConstantNoise(Sensor sensor, double sigma_m);
 
 } // namespace holdfast
