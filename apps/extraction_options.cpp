@@ -2,8 +2,10 @@
 
 #include "command_line.h"
 #include "common_options.h"
+#include "console.h"
 
 #include <holdfast/fit/names.h>
+#include <holdfast/geometry/constants.h>
 #include <holdfast/pcl/names.h>
 #include <holdfast/uncertainty/names.h>
 
@@ -112,9 +114,11 @@ addNeighborhoodOptions(CLI::App& command, SamplerOptions& sampler)
       ->capture_default_str()
       ->group(group);
   command
-      .add_option("--max-patches",
-                  sampler.max_patches,
-                  "Stop after so many patches, those turned down not counted")
+      .add_option(
+          "--max-patches",
+          sampler.max_patches,
+          "Give the best so many patches, spread over the scene by the spacing; "
+          "live: stop after so many")
       ->check(CLI::Range(1, 100000000, "N"))
       ->type_name("")
       ->group(group);
@@ -152,9 +156,73 @@ addNeighborhoodOptions(CLI::App& command, SamplerOptions& sampler)
 }
 
 void
-addValidationOptions(CLI::App& command, ValidationOptions& limits)
+addOverlapOption(CLI::App& command, double& max_overlap)
 {
+  command
+      .add_option("--no-overlap",
+                  max_overlap,
+                  "Leave out patches of which better ones have more than this share of "
+                  "the points, 0 to 1")
+      ->check(CLI::Range(0.0, 1.0, "SHARE"))
+      ->type_name("")
+      ->group("Seeds and neighbourhoods");
+}
+
+constexpr EnumNames<Accept, 2> kAcceptNames{{"default", "all"}};
+
+// Of addValidationOptions(): limits in terms of the radius of the neighbourhoods.
+void
+addLimitsInRadii(CLI::App& command, ValidationOptions& limits)
+{
+  const auto add = [&](const std::string& name,
+                       std::optional<double>& limit,
+                       const std::string& description) {
+    command
+        .add_option_function<double>(
+            name,
+            [&limit](double value) { limit = value; },
+            description + ", in radii of its neighbourhood")
+        ->check(positiveNumber("RADII"))
+        ->type_name("")
+        ->default_str(formatNumber("%.3g", *limit))
+        ->group("Validation");
+  };
+  add("--max-extent",
+      limits.max_extent,
+      "Turn down patches whose points reach further from the centre (a full disc: 1)");
+  add("--max-sagitta",
+      limits.max_sagitta,
+      "Turn down patches that rise higher over their tangent plane");
+  add("--max-bend", limits.max_bend, "Turn down patches of a larger curvature");
+  add("--max-departure",
+      limits.max_departure,
+      "Turn down patches with a point further from the surface");
+}
+
+void
+addValidationOptions(CLI::App& command, ExtractionSettings& settings)
+{
+  ValidationOptions& limits = settings.options.validation.emplace();
   const std::string group = "Validation";
+  addChoice(
+      command,
+      "--accept",
+      settings.accept,
+      kAcceptNames,
+      "Patches that keep the limits, or all, in JSON and mesh, with their verdict")
+      ->default_str("default")
+      ->group(group);
+  addLimitsInRadii(command, limits);
+  command
+      .add_option(
+          "--max-view-angle",
+          settings.max_view_angle_deg,
+          "Turn down patches that are seen at a larger angle from their normal, "
+          "degrees")
+      ->check(CLI::Range(1.0, 90.0, "DEG"))
+      ->type_name("")
+      ->capture_default_str()
+      ->group(group);
   const auto add = [&](const std::string& name,
                        std::optional<double>& limit,
                        const CLI::Validator& valid,
@@ -180,11 +248,12 @@ addValidationOptions(CLI::App& command, ValidationOptions& limits)
   add("--min-coverage",
       limits.min_coverage,
       CLI::Range(0.0, 1.0, "SHARE"),
-      "Turn down patches of which points support a smaller share, 0 to 1");
+      "Turn down patches of which points support a smaller share, 0 to 1 (default "
+      "0.5)");
   add("--max-chi2",
       limits.max_chi2_per_dof,
       positiveNumber("RATIO"),
-      "Turn down patches with a larger chi-square per degree of freedom");
+      "Turn down patches with a larger chi-square over what it should be (default 3)");
 }
 
 } // namespace
@@ -194,7 +263,8 @@ addExtractionOptions(CLI::App& command, ExtractionSettings& settings)
 {
   addPatchOptions(command, settings);
   addNeighborhoodOptions(command, settings.options.sampler);
-  addValidationOptions(command, settings.options.validation.emplace());
+  addOverlapOption(command, settings.options.max_overlap);
+  addValidationOptions(command, settings);
   addThreadsOption(command, settings.options.threads);
   exclude(command, "--paper", {"--residual"});
 }
@@ -215,6 +285,9 @@ finishExtractionOptions(const CLI::App& command, ExtractionSettings& settings)
       paper.curvature_tolerance_per_m = fit.curvature_tolerance_per_m;
     fit = paper;
   }
+  settings.options.keep_turned_down = settings.accept == Accept::All;
+  settings.options.validation->max_view_angle_rad =
+      settings.max_view_angle_deg * kPi / 180.0;
   const SamplerOptions& sampler = settings.options.sampler;
   const bool knn = sampler.neighborhood == Neighborhood::Knn;
   if (command.count("--k") > 0 && !knn)

@@ -7,10 +7,18 @@
 
 namespace holdfast::app {
 
+/// Which patches are given.
+enum class Accept {
+  Default, ///< those that keep the limits
+  All ///< also those that do not, with their verdict
+};
+
 struct ExtractionSettings {
   /// Complete after finishExtractionOptions().
   ExtractionOptions options;
   bool paper = false;
+  Accept accept = Accept::Default;
+  double max_view_angle_deg = 85.0;
 };
 
 /// Adds surfaces, neighbourhoods, validation and threads. `settings` must outlive the

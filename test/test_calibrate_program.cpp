@@ -240,7 +240,15 @@ TEST_F(CalibrateProgram, MapsTheFixedPatternAndFitSubtractsIt)
 
   // What is left of a wall it has not seen agrees with what the sensor file promises.
   const auto ratio = [&](const Names& more) -> double {
-    Names arguments{"fit", third, "--sensor", sensor, "--whole", "--json", "-"};
+    Names arguments{"fit",
+                    third,
+                    "--sensor",
+                    sensor,
+                    "--whole",
+                    "--accept",
+                    "all",
+                    "--json",
+                    "-"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     const ProgramRun fit = test::runProgram(folder_, arguments);
     EXPECT_EQ(fit.exit_code, 0) << fit.err;

@@ -157,14 +157,24 @@ TEST_F(ExperimentProgram, NeighborhoodsShowThatSmallBallsCutTheNoise)
 {
   const Json json = shortRun("neighborhoods");
   for (const Json& row : json.at("rows")) {
-    if (row.at("radius_m") != 0.0126)
+    SCOPED_TRACE(row.dump());
+    const std::string kind = row.at("neighborhood");
+    const double tilt = row.at("tilt_rad"), extent = row.at("extent");
+    // A disc of pixels stretches by 1/cos, a patch does not.
+    if (kind == "patch" && tilt < 1.2 && row.at("radius_m") > 0.02) {
+      EXPECT_NEAR(extent, 1.0, 0.1);
+    }
+    if (kind == "disc" && tilt > 1.0) {
+      EXPECT_GT(extent, 1.5);
+    }
+    if (row.at("radius_m") != 0.0126 || row.at("noise") != "independent")
       continue;
     // 20 discs of 145 points: standard error 2.6 %.
-    if (row.at("neighborhood") == "disc") {
-      EXPECT_NEAR(row.at("chi2_per_dof").get<double>(), 1.0, 0.13);
+    if (kind == "disc" || kind == "patch") {
+      EXPECT_NEAR(row.at("chi2_ratio").get<double>(), 1.0, 0.13);
     }
-    if (row.at("neighborhood") == "ball") {
-      EXPECT_LT(row.at("chi2_per_dof").get<double>(), 0.85);
+    if (kind == "ball") {
+      EXPECT_LT(row.at("chi2_ratio").get<double>(), 0.85);
     }
   }
 }
@@ -387,11 +397,11 @@ TEST_F(ExperimentProgram, WritesTableAndFiles)
   const test::ProgramRun run =
       experiment({"neighborhoods", "--trials", "3", "-o", out});
   ASSERT_EQ(run.exit_code, 0) << run.err;
-  EXPECT_NE(run.out.find("chi2/dof"), std::string::npos);
+  EXPECT_NE(run.out.find("chi2 ratio"), std::string::npos);
   EXPECT_EQ(test::filesIn(out),
             (Names{"neighborhoods.csv", "neighborhoods.json", "neighborhoods.svg"}));
   const std::string csv = test::readFile(out + "/neighborhoods.csv");
-  EXPECT_EQ(csv.rfind("neighborhood,radius_m,points,", 0), 0u);
+  EXPECT_EQ(csv.rfind("neighborhood,noise,radius_m,tilt_rad,points,", 0), 0u);
   const Json json = Json::parse(test::readFile(out + "/neighborhoods.json"));
   EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')),
             json.at("rows").size() + 1);

@@ -248,9 +248,17 @@ TEST(FitProgram, RecordedCloudsRunClean)
     const std::string path = test::recordedCloud(name);
     if (path.empty())
       GTEST_SKIP() << "no recorded clouds: set HOLDFAST_DATA_DIR";
-    const auto run =
-        runProgram(folder,
-                   {"fit", path, "--seeds", "300", "--radius", "0.02", "--json", "-"});
+    const auto run = runProgram(folder,
+                                {"fit",
+                                 path,
+                                 "--seeds",
+                                 "300",
+                                 "--radius",
+                                 "0.02",
+                                 "--accept",
+                                 "all",
+                                 "--json",
+                                 "-"});
     EXPECT_EQ(run.exit_code, 0) << name << run.err;
     EXPECT_GT(Json::parse(run.out)["patches"].size(), 10U) << name;
   }

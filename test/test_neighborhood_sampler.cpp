@@ -609,18 +609,29 @@ TEST(Seeds, NeverExceedTheLimitAndStillSpanTheCloud)
     }
 }
 
-TEST(Seeds, OfAGridAreOneSpacingApart)
+// A floor from 1 to 5 m: seeds are as dense on it far away as near by.
+TEST(Seeds, OfAGridAreOneSpacingApartNearAndFar)
 {
-  const double depth = 2.0;
-  const RangeCloud cloud =
-      makeOrganizedCloud(kCamera, [depth](int, int) { return depth; });
-  const double spacing = 0.2; // 10 px
-  const Indices seeds = seedsOf(cloud, makeSeedOptions(SeedStrategy::Grid, spacing));
-  Indices expected;
-  for (int v = 5; v < kCamera.height; v += 10)
-    for (int u = 5; u < kCamera.width; u += 10)
-      expected.push_back(v * kCamera.width + u);
-  EXPECT_EQ(seeds, expected);
+  const Camera camera = makeCamera(160, 120, 200.0);
+  const RangeCloud cloud = makeOrganizedCloud(camera, [&](int, int v) {
+    return 1.0 / (0.2 + 0.8 * v / camera.height);
+  });
+  constexpr double kSpacing = 0.1;
+  SamplerOptions options = makeSeedOptions(SeedStrategy::Grid, kSpacing);
+  const NeighborhoodSampler sampler(cloud, makeSensor(camera), options);
+  const Indices seeds = sampler.seeds();
+  std::vector<double> nearest_seed(cloud.points->size(), 1e9);
+  for (std::size_t i = 0; i < seeds.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j)
+      EXPECT_GE(distance(cloud, seeds[i], seeds[j]), kSpacing * (1.0 - 1e-6));
+    for (std::size_t k = 0; k < nearest_seed.size(); ++k)
+      nearest_seed[k] =
+          std::min(nearest_seed[k], distance(cloud, seeds[i], static_cast<int>(k)));
+  }
+  // Every point would be within one spacing if all pixels had been tried; those between
+  // are a quarter of one apart, in rows whose distance on the floor is up to 0.13 m.
+  for (const double d : nearest_seed)
+    EXPECT_LT(d, 2.4 * kSpacing);
 }
 
 TEST(Seeds, OfAVoxelGridAreTheNearestToTheCentre)

@@ -232,6 +232,9 @@ TEST(Neighborhoods, OfPclSearchesAreThoseOfTheSampler)
   const auto seeds = someSeeds(*cloud);
   for (const bool by_radius : {true, false}) {
     auto ours = makeEstimation(cloud);
+    SamplerOptions balls;
+    balls.neighborhood = Neighborhood::Ball;
+    ours.setSamplerOptions(balls);
     ours.setIndices(seeds);
     ours.setRadiusSearch(by_radius ? 0.06 : 0.0);
     ours.setKSearch(by_radius ? 0 : 150);
@@ -413,7 +416,11 @@ TEST(Validation, TurnsPatchesDownWithTheReason)
   const auto cloud = makeGround(random);
   auto estimation = makeEstimation(cloud);
   estimation.setIndices(someSeeds(*cloud));
+  SamplerOptions discs;
+  discs.neighborhood = Neighborhood::Disc; // which have no second attempt
+  estimation.setSamplerOptions(discs);
   estimation.setRadiusSearch(0.06);
+  estimation.setValidationOptions(std::nullopt);
   Patches patches;
   estimation.compute(patches);
   ASSERT_TRUE(patches.is_dense);

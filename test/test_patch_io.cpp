@@ -187,8 +187,10 @@ TEST(PatchIo, JsonHasTheDocumentedMembers)
                                       "chi2_dof",
                                       "chi2_expected",
                                       "iterations",
+                                      "verdict",
                                       "residual",
                                       "coverage",
+                                      "second_attempt",
                                       "seed",
                                       "radius"}));
   EXPECT_EQ(patch["surface"], "elliptic_paraboloid");

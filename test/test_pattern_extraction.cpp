@@ -98,6 +98,7 @@ fitInto(Nees& nees, const RangeCloud& cloud, const Sensor& sensor)
   options.fit.surface = SurfaceRequest::Plane;
   options.fit.plane_boundary = BoundaryType::Circle;
   options.threads = 1;
+  options.validation.reset(); // nothing is selected by what is judged
   NeighborhoodSampler sampler(cloud, sensor, options.sampler);
   PatchSites sites;
   sites.seeds = seedsAt(cloud, pixelsFarApart(sensor.camera));

@@ -299,8 +299,8 @@ TEST(Grid, ThatIsNoCamerasIsNoted)
       (*mirrored)(u, v) = (*room.points)(u, kCamera.height - 1 - v);
   RangeCloud cloud = room;
   cloud.points = mirrored;
-  EXPECT_TRUE(isNoted(extract(cloud), "balls take the place of discs"));
-  EXPECT_FALSE(isNoted(extract(room), "balls"));
+  EXPECT_TRUE(isNoted(extract(cloud), "patches are not cut at jumps"));
+  EXPECT_FALSE(isNoted(extract(room), "not cut"));
 }
 
 }} // namespace holdfast

@@ -16,12 +16,14 @@ using test::Sample;
 
 constexpr std::uint64_t kCases = 20;
 
+const ValidationOptions kNone = ValidationOptions::withoutLimits();
+
 // Limits that sound fits of the robot scenes keep with a wide margin: curvatures are at
 // most 10 1/m, the noise 2 to 5 mm.
 ValidationOptions
 fairLimits()
 {
-  ValidationOptions options;
+  ValidationOptions options = kNone;
   options.max_curvature_per_m = 20.0;
   options.max_residual_m = 0.01;
   options.min_coverage = 0.4;
@@ -71,11 +73,11 @@ TEST_P(Checks, RejectByEveryLimitJustBelowTheMeasuredValue)
   Random random;
   const Fit fit = fitTo(test::robotSample(GetParam(), 1.0, random), GetParam());
   ASSERT_TRUE(isUsable(fit.result.status));
-  const Validation measured = validate(fit.result, fit.batch, {});
+  const Validation measured = validate(fit.result, fit.batch, kNone);
   EXPECT_EQ(measured.verdict, PatchVerdict::Accepted) << "without limits";
   const auto verdict = [&](std::optional<double> ValidationOptions::*limit,
                            double value) {
-    ValidationOptions options;
+    ValidationOptions options = kNone;
     options.*limit = value;
     return validate(fit.result, fit.batch, options).verdict;
   };
@@ -106,7 +108,7 @@ TEST_P(Checks, RejectAPatchWhosePointsLeaveMostOfItEmpty)
     const Sample sample = test::robotSample(GetParam(), 1.0, random);
     const Fit fit = fitTo(sample, GetParam());
     // Cells that do not grow as the points get fewer.
-    ValidationOptions options;
+    ValidationOptions options = kNone;
     options.coverage.cell_size_m = 0.03;
     options.coverage.points_per_cell =
         fit.batch.size() * 0.03 * 0.03 / projectedArea(fit.result.patch);
@@ -128,10 +130,28 @@ TEST_P(Checks, RejectASurfaceThatTheNoiseDoesNotExplain)
   test::addBumps(sample, 0.02, 20.0);
   const Fit fit = fitTo(sample, GetParam());
   ASSERT_TRUE(isUsable(fit.result.status)) << statusName(fit.result.status);
-  ValidationOptions options;
+  ValidationOptions options = kNone;
   options.max_chi2_per_dof = 1.5;
   EXPECT_EQ(validate(fit.result, fit.batch, options).verdict,
             PatchVerdict::ChiSquareTooLarge);
+}
+
+// No point of the surface within the bounds is higher over the tangent plane.
+TEST_P(Checks, MeasureASagittaThatHoldsAllHeights)
+{
+  Random random;
+  const Fit fit = fitTo(test::robotSample(GetParam(), 0.3, random), GetParam());
+  ASSERT_TRUE(isUsable(fit.result.status));
+  const Patch& patch = fit.result.patch;
+  const double sagitta = validate(fit.result, fit.batch, kNone).sagitta_m;
+  const Eigen::Vector2d k = patch.principalCurvatures();
+  EXPECT_EQ(k.isZero(0.0), sagitta == 0.0);
+  for (int i = 0; i < 100; ++i) {
+    const double angle = random.uniform(0.0, 6.28);
+    const double dy = isRevolute(patch.type) ? patch.d[0] : patch.d[1];
+    const double x = patch.d[0] * std::cos(angle), y = dy * std::sin(angle);
+    EXPECT_LE(std::abs(0.5 * (k.x() * x * x + k.y() * y * y)), sagitta * (1.0 + 1e-12));
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(AllTypes,
@@ -156,9 +176,9 @@ TEST(Verdicts, WithoutAFinitePointAreNotUsable)
   const Fit fit = fitTo(test::robotSample(type, 1.0, random), type);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const std::vector<Eigen::Vector3d> none, invalid(3, {0.0, nan, 0.0});
-  EXPECT_EQ(validate(fit.result, none, {}).verdict, PatchVerdict::NotUsable);
-  EXPECT_EQ(validate(fit.result, invalid, {}).verdict, PatchVerdict::NotUsable);
-  EXPECT_EQ(validate(fit.result, PointBatch(), {}).verdict, PatchVerdict::NotUsable);
+  EXPECT_EQ(validate(fit.result, none, kNone).verdict, PatchVerdict::NotUsable);
+  EXPECT_EQ(validate(fit.result, invalid, kNone).verdict, PatchVerdict::NotUsable);
+  EXPECT_EQ(validate(fit.result, PointBatch(), kNone).verdict, PatchVerdict::NotUsable);
 }
 
 TEST(Verdicts, NameTheFirstLimitThatIsBroken)
@@ -166,7 +186,7 @@ TEST(Verdicts, NameTheFirstLimitThatIsBroken)
   Random random;
   const PatchType type = kPatchTypes.front();
   const Fit fit = fitTo(test::robotSample(type, 1.0, random), type);
-  ValidationOptions options;
+  ValidationOptions options = kNone;
   const auto verdict = [&] { return validate(fit.result, fit.batch, options).verdict; };
   options.max_chi2_per_dof = 1e-3;
   EXPECT_EQ(verdict(), PatchVerdict::ChiSquareTooLarge);
@@ -186,20 +206,64 @@ TEST(Verdicts, OnPointsBeyondAllReasonAreNotAccepted)
   const PatchType type = kPatchTypes.front();
   const Fit fit = fitTo(test::robotSample(type, 1.0, random), type);
   const std::vector<Eigen::Vector3d> far(10, Eigen::Vector3d::Constant(1e200));
-  ValidationOptions options;
+  ValidationOptions options = kNone;
   options.max_residual_m = 0.01;
   EXPECT_EQ(validate(fit.result, far, options).verdict, PatchVerdict::ResidualTooLarge);
-  EXPECT_EQ(validate(fit.result, far, {}).coverage.share, 0.0);
+  EXPECT_EQ(validate(fit.result, far, kNone).coverage.share, 0.0);
 }
 
 TEST(Verdicts, HaveNamesOfTheirOwn)
 {
   std::set<std::string_view> names;
-  for (int i = 0; i <= static_cast<int>(PatchVerdict::ChiSquareTooLarge); ++i)
+  for (int i = 0; i <= static_cast<int>(PatchVerdict::NormalNotSeen); ++i)
     names.insert(verdictName(static_cast<PatchVerdict>(i)));
-  EXPECT_EQ(names.size(), 6u);
+  EXPECT_EQ(names.size(), 10u);
   EXPECT_EQ(verdictName(PatchVerdict::Accepted), "accepted");
   EXPECT_EQ(verdictName(PatchVerdict::ChiSquareTooLarge), "chi_square_too_large");
+}
+
+// In radii of the neighbourhood; without one they are not asked.
+TEST(Verdicts, OnWhatIsMeasuredInRadii)
+{
+  Random random;
+  const PatchType type{SurfaceType::EllipticParaboloid, BoundaryType::Ellipse};
+  const Fit fit = fitTo(test::robotSample(type, 1.0, random), type);
+  constexpr double kRadius = 0.1;
+  const Validation measured = validate(fit.result, fit.batch, kNone, kRadius);
+  EXPECT_EQ(measured.verdict, PatchVerdict::Accepted);
+  const auto expectLimit = [&](std::optional<double> ValidationOptions::*limit,
+                               double value,
+                               PatchVerdict rejected) {
+    ValidationOptions options = kNone;
+    options.*limit = 1.001 * value;
+    EXPECT_EQ(validate(fit.result, fit.batch, options, kRadius).verdict,
+              PatchVerdict::Accepted);
+    options.*limit = 0.999 * value;
+    EXPECT_EQ(validate(fit.result, fit.batch, options, kRadius).verdict, rejected);
+    EXPECT_EQ(validate(fit.result, fit.batch, options).verdict,
+              limit == &ValidationOptions::max_view_angle_rad ? rejected :
+                                                                PatchVerdict::Accepted);
+  };
+  expectLimit(&ValidationOptions::max_extent,
+              measured.extent_m / kRadius,
+              PatchVerdict::ExtentTooLarge);
+  expectLimit(&ValidationOptions::max_sagitta,
+              measured.sagitta_m / kRadius,
+              PatchVerdict::SagittaTooLarge);
+  expectLimit(&ValidationOptions::max_bend,
+              measured.curvature_per_m * kRadius,
+              PatchVerdict::CurvatureTooLarge);
+  expectLimit(&ValidationOptions::max_departure,
+              measured.residual.largest_m / kRadius,
+              PatchVerdict::DepartureTooLarge);
+  ValidationOptions options = kNone;
+  options.max_view_angle_rad = 1.5;
+  const double angle = validate(fit.result, fit.batch, options).view_angle_rad;
+  const Eigen::Vector3d ray = fit.batch.viewpoint() - fit.result.patch.c;
+  EXPECT_NEAR(std::cos(angle), fit.result.patch.normal().dot(ray.normalized()), 1e-12);
+  expectLimit(&ValidationOptions::max_view_angle_rad,
+              angle,
+              PatchVerdict::NormalNotSeen);
 }
 
 TEST(ValidationOptionsCheck, NamesWhatIsWrong)
@@ -210,7 +274,7 @@ TEST(ValidationOptionsCheck, NamesWhatIsWrong)
   const auto expectError = [](std::optional<double> ValidationOptions::*limit,
                               double value,
                               const char* name) {
-    ValidationOptions options;
+    ValidationOptions options = kNone;
     options.*limit = value;
     EXPECT_NE(validityError(options).find(name), std::string::npos) << value;
     EXPECT_THROW(validate(FitResult(), PointBatch(), options), std::invalid_argument);
@@ -219,10 +283,15 @@ TEST(ValidationOptionsCheck, NamesWhatIsWrong)
     expectError(&ValidationOptions::max_curvature_per_m, bad, "max_curvature_per_m");
     expectError(&ValidationOptions::max_residual_m, bad, "max_residual_m");
     expectError(&ValidationOptions::max_chi2_per_dof, bad, "max_chi2_per_dof");
+    expectError(&ValidationOptions::max_extent, bad, "max_extent");
+    expectError(&ValidationOptions::max_sagitta, bad, "max_sagitta");
+    expectError(&ValidationOptions::max_bend, bad, "max_bend");
+    expectError(&ValidationOptions::max_departure, bad, "max_departure");
+    expectError(&ValidationOptions::max_view_angle_rad, bad, "max_view_angle_rad");
   }
   for (const double bad : {-0.1, 1.1, nan})
     expectError(&ValidationOptions::min_coverage, bad, "min_coverage");
-  ValidationOptions options;
+  ValidationOptions options = kNone;
   options.coverage.max_spill = -1.0;
   EXPECT_NE(validityError(options).find("max_spill"), std::string::npos);
 }

@@ -61,7 +61,9 @@ squaredCovariance(const PatchFit& fit)
     return {};
   const ThetaMatrix inverse =
       fit.surface.JtJ.llt().solve(ThetaMatrix(ThetaMatrix::Identity()));
-  const PatchJacobian& F = fit.bounded.jacobian;
+  const Eigen::MatrixXd F =
+      parametersByAxes(fit.bounded.axes, fit.bounded.squared_bound) *
+      fit.bounded.jacobian;
   ParameterMatrix covariance =
       propagate(F.middleCols<6>(JointLayout::kTheta), inverse * inverse);
   const int bounds = layoutOf(type).d_count;

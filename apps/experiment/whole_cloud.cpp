@@ -59,7 +59,10 @@ public:
   /// Of the pixels of a patch.
   FitResult fitFor(const ExtractedPatch& patch)
   {
-    sampler_.neighborhood(patch.seed_index.value(), *scratch_, indices_);
+    if (patch.is_second_attempt)
+      sampler_.strictNeighborhood(patch.seed_index.value(), *scratch_, indices_);
+    else
+      sampler_.neighborhood(patch.seed_index.value(), *scratch_, indices_);
     gatherer_.gather(indices_, patch.seed, batch_);
     for (std::size_t i = 0; i < indices_.size(); ++i) {
       const Eigen::Vector3d q =

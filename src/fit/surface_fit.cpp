@@ -278,10 +278,19 @@ public:
       linearize(surface, problem_.scatter, sums, result);
       return result;
     }
-    const std::vector<double> less(static_cast<std::size_t>(points_.padded_size),
-                                   -problem_.batch.pattern()->variance());
+    // Aligned as the kernel loads it.
+    struct alignas(64) Lanes {
+      double value[PointBatch::kLaneMultiple];
+    };
+    Lanes lanes;
+    std::fill(std::begin(lanes.value),
+              std::end(lanes.value),
+              -problem_.batch.pattern()->variance());
+    const std::vector<Lanes> less(
+        static_cast<std::size_t>(points_.padded_size / PointBatch::kLaneMultiple),
+        lanes);
     kernel::PatternPoints pattern = pattern_;
-    pattern.extra = less.data();
+    pattern.extra = less.front().value;
     kernel::Points points = points_;
     points.pattern = &pattern;
     accumulate(points, surface, sums);

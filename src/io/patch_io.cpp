@@ -170,7 +170,12 @@ validationJson(const std::optional<ValidationOptions>& validation)
 {
   if (!validation)
     return {};
-  return {{"max_curvature", optionalJson(validation->max_curvature_per_m)},
+  return {{"max_extent", optionalJson(validation->max_extent)},
+          {"max_sagitta", optionalJson(validation->max_sagitta)},
+          {"max_bend", optionalJson(validation->max_bend)},
+          {"max_departure", optionalJson(validation->max_departure)},
+          {"max_view_angle", optionalJson(validation->max_view_angle_rad)},
+          {"max_curvature", optionalJson(validation->max_curvature_per_m)},
           {"max_residual", optionalJson(validation->max_residual_m)},
           {"min_coverage", optionalJson(validation->min_coverage)},
           {"max_chi2_per_dof", optionalJson(validation->max_chi2_per_dof)}};
@@ -196,6 +201,7 @@ optionsJson(const PatchReport& report)
           {"smooth_circle_radius", fit.smooth_circle_radius},
           {"statistical_discrimination", fit.statistical_discrimination},
           {"covariance", covarianceModeName(report.options.covariance)},
+          {"max_overlap", report.options.max_overlap},
           {"validation", validationJson(report.options.validation)}};
 }
 
@@ -248,11 +254,14 @@ patchJson(const ExtractedPatch& extracted, const PatchReport& report)
             {"chi2_dof", fit.chi2_dof},
             {"chi2_expected", fit.chi2_expected},
             {"iterations", fit.iterations},
+            {"verdict", Json()},
             {"residual", Json()},
             {"coverage", Json()},
+            {"second_attempt", extracted.is_second_attempt},
             {"seed", seed},
             {"radius", extracted.radius_m > 0.0 ? Json(extracted.radius_m) : Json()}};
   if (const auto& validation = extracted.validation) {
+    json["verdict"] = verdictName(validation->verdict);
     json["residual"] = {{"rms", validation->residual.rms_m},
                         {"largest", validation->residual.largest_m}};
     json["coverage"] = validation->coverage.share;
@@ -424,11 +433,14 @@ patchFromJson(const Json& json, double containment)
     for (Eigen::Index i = 0; i < 3; ++i)
       extracted.seed(i) = number(seed.at("point").at(static_cast<std::size_t>(i)));
   }
+  extracted.is_second_attempt = json.value("second_attempt", false);
   if (const Json& radius = json.at("radius"); !radius.is_null())
     extracted.radius_m = radius;
   if (const Json& residual = json.at("residual"); !residual.is_null()) {
     Validation& validation = extracted.validation.emplace();
-    validation.verdict = PatchVerdict::Accepted;
+    // Files of former versions hold accepted patches alone.
+    const std::string verdict = json.value("verdict", "accepted");
+    validation.verdict = known(kVerdictNames.find(verdict), verdict);
     validation.residual.rms_m = number(residual.at("rms"));
     validation.residual.largest_m = number(residual.at("largest"));
     validation.coverage.share = number(json.at("coverage"));

@@ -86,7 +86,7 @@ FrameExtractor::extract(const RangeCloud& frame)
   if (width != width_ || height != height_)
     restart(width, height);
   ExtractionResult result =
-      extractPatches(frame, sensor_, options_, {seedsAt(frame, seeds_), {}});
+      extractPatches(frame, sensor_, options_, {seedsAt(frame, seeds_), {}, {}});
   putFailuresLast(result.patches, seeds_);
   result.patches = acceptedAmong(std::move(result.patches));
   return result;

@@ -4,6 +4,7 @@
 
 #include "extraction_advice.h"
 #include "parallel/parallel_for.h"
+#include "patch_choice.h"
 #include "point_gatherer.h"
 #include "point_selection.h"
 #include "sampling_budget.h"
@@ -33,6 +34,9 @@ requireValid(const ExtractionOptions& options)
 {
   requireValid(validityError(options.fit));
   requireValid(options.validation ? validityError(*options.validation) : "");
+  requireValid(options.max_overlap >= 0.0 && options.max_overlap <= 1.0 ?
+                   "" :
+                   "the overlap must lie between 0 and 1");
   requireValid(options.threads < 0 ? "the number of threads must not be negative" : "");
 }
 
@@ -70,21 +74,31 @@ public:
   , estimator_(options.fit, options.covariance)
   , validation_(options.validation)
   {
+    // Where the sensor was not, or was we do not know where, nothing was seen at a
+    // graze.
+    if (validation_ &&
+        (side_ != NormalSide::Viewpoint || !chosen.viewpoint_is_credible))
+      validation_->max_view_angle_rad.reset();
+    if (validation_ && chosen.noise_is_assumed)
+      validation_->max_chi2_per_dof.reset();
     if (side_ == NormalSide::Outward)
       middle_ = centroid(chosen.cloud, finitePoints(chosen.cloud));
   }
 
+  /// \param radius_m of the neighbourhood; 0: there is none
   /// \param batch working memory
   ExtractedPatch make(const std::vector<int>& indices,
                       const Eigen::Vector3d& place,
+                      double radius_m,
                       PointBatch& batch) const
   {
     ExtractedPatch patch;
+    patch.radius_m = radius_m;
     gatherer_.gather(indices, place, batch);
     turnNormals(place, batch);
     patch.fit = estimator_.estimate(batch);
     if (validation_)
-      patch.validation = validate(patch.fit, batch, *validation_);
+      patch.validation = validate(patch.fit, batch, *validation_, radius_m);
     return patch;
   }
 
@@ -116,19 +130,24 @@ private:
 struct CompleteSites {
   std::vector<Seed> seeds;
   NeighborhoodSearch search;
+  NeighborhoodSearch second_search; ///< may be none
   double radius_m = 0.0; ///< of the neighbourhoods; 0: they have none
   bool promising = true; ///< else it has been said what is wrong
 };
 
 /// The neighbourhoods of a sampler, whose lifetime they share.
+/// \param find NeighborhoodSampler::neighborhood or strictNeighborhood
+template <typename Find>
 NeighborhoodSearch
-searchOf(const std::shared_ptr<const NeighborhoodSampler>& sampler, int threads)
+searchOf(const std::shared_ptr<const NeighborhoodSampler>& sampler,
+         int threads,
+         Find find)
 {
   auto scratch = std::make_shared<std::vector<NeighborhoodSampler::ScratchPtr>>();
   for (int thread = 0; thread < threads; ++thread)
     scratch->push_back(sampler->makeScratch());
-  return [sampler, scratch](const Seed& seed, int thread, std::vector<int>& indices) {
-    sampler->neighborhood(seed.index, *(*scratch)[thread], indices);
+  return [=](const Seed& seed, int thread, std::vector<int>& indices) {
+    (*sampler.*find)(seed.index, *(*scratch)[thread], indices);
   };
 }
 
@@ -142,6 +161,7 @@ completeSites(const PatchSites& asked,
   CompleteSites sites;
   sites.radius_m = knn ? 0.0 : options.sampler.radius_m;
   sites.search = asked.search;
+  sites.second_search = asked.second_search;
   if (asked.seeds)
     sites.seeds = *asked.seeds;
   if (asked.search)
@@ -149,7 +169,11 @@ completeSites(const PatchSites& asked,
   const auto sampler = std::make_shared<const NeighborhoodSampler>(chosen.cloud,
                                                                    chosen.sensor,
                                                                    options.sampler);
-  sites.search = searchOf(sampler, threadCount(options.threads));
+  const int threads = threadCount(options.threads);
+  sites.search = searchOf(sampler, threads, &NeighborhoodSampler::neighborhood);
+  if (options.sampler.neighborhood == Neighborhood::Patch)
+    sites.second_search =
+        searchOf(sampler, threads, &NeighborhoodSampler::strictNeighborhood);
   if (const std::string notice = fallbackNotice(*sampler, chosen.cloud);
       !notice.empty())
     notices.push_back(notice);
@@ -198,22 +222,67 @@ private:
   std::atomic<bool> over_{false};
 };
 
+/// True when another part of the neighbourhood may be what was asked for.
+bool
+deservesSecondAttempt(const ExtractedPatch& patch)
+{
+  return isUsable(patch.fit.status) && !isAccepted(patch) &&
+         patch.validation->verdict != PatchVerdict::NormalNotSeen;
+}
+
+/// Working memory of one thread.
+struct Workspace {
+  std::vector<int> indices;
+  PointBatch batch;
+};
+
+/// The patch around a seed, of the second attempt where only that one is accepted.
+ExtractedPatch
+attemptAt(const Seed& seed,
+          int thread,
+          const CompleteSites& sites,
+          const PatchMaker& maker,
+          Workspace& work)
+{
+  sites.search(seed, thread, work.indices);
+  ExtractedPatch patch =
+      maker.make(work.indices, seed.position, sites.radius_m, work.batch);
+  if (sites.second_search && deservesSecondAttempt(patch)) {
+    const std::size_t size = work.indices.size();
+    std::vector<int> first = work.indices;
+    sites.second_search(seed, thread, work.indices);
+    ExtractedPatch second;
+    if (work.indices.size() < size)
+      second = maker.make(work.indices, seed.position, sites.radius_m, work.batch);
+    if (work.indices.size() < size && isAccepted(second)) {
+      patch = std::move(second);
+      patch.is_second_attempt = true;
+    }
+    else {
+      work.indices = std::move(first);
+    }
+  }
+  patch.seed_index = seed.index;
+  patch.seed = seed.position;
+  return patch;
+}
+
 /// One attempt per seed in their order, until the budget is spent.
+/// \param supports the points of each attempt, where they are asked for
 std::vector<ExtractedPatch>
 attemptAll(const CompleteSites& sites,
            const PatchMaker& maker,
            const ExtractionOptions& options,
-           SamplingBudget& budget)
+           SamplingBudget& budget,
+           std::vector<std::vector<int>>& supports)
 {
-  struct Workspace {
-    std::vector<int> indices;
-    PointBatch batch;
-  };
+  const bool keep_supports = options.max_overlap < 1.0;
   std::vector<Workspace> workspaces(
       static_cast<std::size_t>(threadCount(options.threads)));
   std::vector<ExtractedPatch> attempts(sites.seeds.size());
   // The points of attempts that wait to be looked at, where covered area counts.
   std::vector<std::vector<int>> covered(budget.limitsArea() ? attempts.size() : 0);
+  supports.resize(keep_supports ? attempts.size() : 0);
   InOrder count(attempts.size(), [&](std::size_t i) {
     const std::vector<int> points =
         covered.empty() ? std::vector<int>() : std::move(covered[i]);
@@ -227,13 +296,11 @@ attemptAll(const CompleteSites& sites,
     const auto i = static_cast<std::size_t>(item);
     const Seed& seed = sites.seeds[i];
     Workspace& work = workspaces[static_cast<std::size_t>(thread)];
-    sites.search(seed, thread, work.indices);
-    attempts[i] = maker.make(work.indices, seed.position, work.batch);
-    attempts[i].seed_index = seed.index;
-    attempts[i].seed = seed.position;
-    attempts[i].radius_m = sites.radius_m;
+    attempts[i] = attemptAt(seed, thread, sites, maker, work);
     if (!covered.empty())
       covered[i] = work.indices;
+    if (keep_supports)
+      supports[i] = work.indices;
     count.finish(i);
   };
   parallelFor(static_cast<int>(attempts.size()),
@@ -241,24 +308,67 @@ attemptAll(const CompleteSites& sites,
               attempt,
               options.progress);
   attempts.resize(count.seen());
+  supports.resize(keep_supports ? attempts.size() : 0);
   return attempts;
+}
+
+/// True when all seeds are tried and the best patches are taken, since nothing but
+/// their number is limited.
+bool
+takesBest(const SamplerOptions& sampler, const PatchSites& asked)
+{
+  return sampler.max_patches > 0 && !asked.seeds && sampler.max_area_m2 == 0.0 &&
+         sampler.max_time_s == 0.0;
+}
+
+/// Leaves out what overlaps, then what is too many.
+void
+choose(const ExtractionOptions& options,
+       const PatchSites& asked,
+       const std::vector<std::vector<int>>& supports,
+       std::size_t points,
+       std::vector<ExtractedPatch>& attempts,
+       std::vector<std::string>& notices)
+{
+  if (options.max_overlap < 1.0) {
+    const int left_out = thinOut(options.max_overlap, supports, points, attempts);
+    if (left_out > 0)
+      notices.push_back(std::to_string(left_out) +
+                        " patches are left out, since better ones have their points");
+  }
+  if (!takesBest(options.sampler, asked))
+    return;
+  const SamplerOptions& sampler = options.sampler;
+  const int left_out = keepBest(static_cast<std::size_t>(sampler.max_patches),
+                                sampler.spacing_m,
+                                attempts);
+  if (left_out > 0)
+    notices.push_back("the best " + std::to_string(sampler.max_patches) + " of " +
+                      std::to_string(sampler.max_patches + left_out) +
+                      " patches are given");
 }
 
 /// Attempts into patches and reasons.
 void
 sortOut(std::vector<ExtractedPatch> attempts,
-        bool keep_failures,
+        const ExtractionOptions& options,
         ExtractionResult& result)
 {
   for (const ExtractedPatch& patch : attempts) {
+    result.second_attempts += patch.is_second_attempt ? 1 : 0;
     if (!isUsable(patch.fit.status))
       ++result.rejected[patch.fit.status];
     else if (!isAccepted(patch))
       ++result.turned_down[patch.validation->verdict];
   }
   // In place: a patch with its covariance is some kilobytes.
-  result.patches =
-      keep_failures ? std::move(attempts) : acceptedAmong(std::move(attempts));
+  const auto isWanted = [&](const ExtractedPatch& patch) {
+    return options.keep_failures || isAccepted(patch) ||
+           (options.keep_turned_down && isUsable(patch.fit.status));
+  };
+  attempts.erase(std::stable_partition(attempts.begin(), attempts.end(), isWanted),
+                 attempts.end());
+  result.patches = std::move(attempts);
 }
 
 /// What is known before the first fit.
@@ -318,12 +428,23 @@ extractPatches(const RangeCloud& cloud,
   ExtractionResult result = resultOf(chosen, options);
   const PatchMaker maker(chosen, options);
   const CompleteSites sites = completeSites(asked, options, chosen, result.notices);
-  SamplingBudget budget(options.sampler, chosen.cloud.points->size(), start);
-  std::vector<ExtractedPatch> attempts = attemptAll(sites, maker, options, budget);
+  const SamplerOptions limits = takesBest(options.sampler, asked) ?
+                                    withoutLimits(options.sampler) :
+                                    options.sampler;
+  SamplingBudget budget(limits, chosen.cloud.points->size(), start);
+  std::vector<std::vector<int>> supports;
+  std::vector<ExtractedPatch> attempts =
+      attemptAll(sites, maker, options, budget, supports);
   const bool all_tried = attempts.size() == sites.seeds.size();
   if (!asked.seeds)
     noteLimit(attempts.size(), sites.seeds.size(), result.notices);
-  sortOut(std::move(attempts), options.keep_failures, result);
+  choose(options,
+         asked,
+         supports,
+         chosen.cloud.points->size(),
+         attempts,
+         result.notices);
+  sortOut(std::move(attempts), options, result);
   // A stream has no time to measure an empty frame.
   const bool is_stream = asked.seeds && isLimited(options.sampler);
   if (sites.promising && all_tried && !is_stream)
@@ -341,10 +462,10 @@ extractWhole(const RangeCloud& cloud,
   ExtractionResult result = resultOf(chosen, options);
   const std::vector<int> points = finitePoints(chosen.cloud);
   PointBatch batch;
-  sortOut(
-      {PatchMaker(chosen, options).make(points, centroid(chosen.cloud, points), batch)},
-      options.keep_failures,
-      result);
+  sortOut({PatchMaker(chosen, options)
+               .make(points, centroid(chosen.cloud, points), 0.0, batch)},
+          options,
+          result);
   return result;
 }
 

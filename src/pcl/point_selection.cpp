@@ -104,6 +104,7 @@ selectPoints(const RangeCloud& cloud, const Sensor& nominal)
   if (model_asked && view.isForeign()) {
     selection.notices.push_back(view.foreignNotice());
     selection.sensor = withConstantNoise(nominal, kUnknownSigma);
+    selection.noise_is_assumed = true;
   }
   else if (model_asked) {
     view.dropUnseen(unused);

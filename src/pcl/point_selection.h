@@ -18,6 +18,8 @@ struct PointSelection {
   /// where that one cannot have taken the cloud.
   Sensor sensor;
   PointAccounting points;
+  /// The noise is a guess, since the sensor's cannot hold.
+  bool noise_is_assumed = false;
   /// False when nobody said where the cloud was taken from and the points do not look
   /// as if it were the assumed place: normals may then point to the wrong side.
   bool viewpoint_is_credible = true;

@@ -68,47 +68,6 @@ shuffleFront(std::vector<int>& values, std::size_t count, std::mt19937_64& gener
     std::swap(values[i], values[i + drawBelow(values.size() - i, generator)]);
 }
 
-std::size_t
-validCount(const PixelGrid& grid)
-{
-  return static_cast<std::size_t>(
-      std::count_if(grid.depth.begin(), grid.depth.end(), [](float z) {
-        return !std::isnan(z);
-      }));
-}
-
-/// Median of the valid depths, of a regular sample of them in a large image.
-float
-medianDepth(const PixelGrid& grid)
-{
-  constexpr std::size_t kEnough = 20000;
-  const std::size_t step = std::max<std::size_t>(1, validCount(grid) / kEnough);
-  std::vector<float> depth;
-  std::size_t valid = 0;
-  for (const float z : grid.depth)
-    if (!std::isnan(z) && valid++ % step == 0)
-      depth.push_back(z);
-  if (depth.empty())
-    return std::numeric_limits<float>::quiet_NaN();
-  const auto middle = depth.begin() + static_cast<std::ptrdiff_t>(depth.size() / 2);
-  std::nth_element(depth.begin(), middle, depth.end());
-  return *middle;
-}
-
-/// Pixels half a step from the border and then one step apart, as far as valid.
-std::vector<int>
-pixelsEvery(const PixelGrid& grid, double column_step, double row_step)
-{
-  std::vector<int> seeds;
-  for (double v = 0.5 * row_step; v < grid.camera.height; v += row_step) {
-    const float* row = grid.row(static_cast<int>(v));
-    for (double u = 0.5 * column_step; u < grid.camera.width; u += column_step)
-      if (!std::isnan(row[static_cast<int>(u)]))
-        seeds.push_back(static_cast<int>(v) * grid.camera.width + static_cast<int>(u));
-  }
-  return seeds;
-}
-
 std::vector<int>
 onePerVoxel(const Points& points, const std::vector<int>& valid, double size)
 {
@@ -195,22 +154,67 @@ private:
   CellMap<std::vector<Eigen::Vector3d>> buckets_;
 };
 
+/// Whole pixels that a share of the spacing is at a depth, at least one.
+int
+stepAt(float depth, double spacing, double focal)
+{
+  constexpr double kShare = 0.25;
+  constexpr double kMost = 1e6; // wider than images are
+  return static_cast<int>(std::clamp(kShare * spacing * focal / depth, 1.0, kMost));
+}
+
+/// The nearest valid depth; infinite without any.
+float
+nearestDepth(const PixelGrid& grid)
+{
+  float nearest = std::numeric_limits<float>::infinity();
+  for (const float z : grid.depth)
+    if (z < nearest)
+      nearest = z;
+  return nearest;
+}
+
+/// Pixels in the order of rows, each unless one before is nearer in space. Steps of a
+/// quarter of the spacing find nearly as many as all pixels would.
+std::vector<int>
+spacedPixels(const PixelGrid& grid, double spacing)
+{
+  const Camera& camera = grid.camera;
+  const float nearest = nearestDepth(grid);
+  if (std::isinf(nearest))
+    return {};
+  SpacedPoints kept(spacing);
+  std::vector<int> seeds;
+  // Rows as dense as the farthest pixels of a room want them, not denser than one by
+  // one.
+  constexpr float kDeepest = 4.0F; // times the nearest
+  const int row_step = stepAt(kDeepest * nearest, spacing, camera.fy);
+  for (int v = row_step / 2; v < camera.height; v += row_step) {
+    const float* row = grid.row(v);
+    for (int u = 0; u < camera.width;) {
+      const float z = row[u];
+      if (std::isnan(z)) {
+        ++u;
+        continue;
+      }
+      const Eigen::Vector3d p = z * Eigen::Vector3d((u - camera.cx) / camera.fx,
+                                                    (v - camera.cy) / camera.fy,
+                                                    1.0);
+      if (kept.addIfFree(p))
+        seeds.push_back(v * camera.width + u);
+      u += stepAt(z, spacing, camera.fx);
+    }
+  }
+  return seeds;
+}
+
 } // namespace
 
 std::vector<int>
 pixelGridSeeds(const PixelGrid& grid, double spacing_m, int max_seeds)
 {
-  const double depth = medianDepth(grid);
-  if (std::isnan(depth))
-    return {};
   return coarsenedTo(max_seeds, [&](double scale) {
-    const double slope = scale * spacing_m / depth;
-    const auto stepOf = [slope](double focal, int size) {
-      return std::clamp(slope * focal, 1.0, static_cast<double>(size));
-    };
-    return pixelsEvery(grid,
-                       stepOf(grid.camera.fx, grid.camera.width),
-                       stepOf(grid.camera.fy, grid.camera.height));
+    return spacedPixels(grid, scale * spacing_m);
   });
 }
 

@@ -14,7 +14,7 @@ namespace holdfast {
 // In all of these `valid` holds the indices of the valid points, ascending, and
 // `max_seeds` = 0 means no limit.
 
-/// Pixels one spacing apart at the median depth, the first half a step from the corner.
+/// Pixels one spacing apart in space, near and far alike, as densely as that allows.
 std::vector<int> pixelGridSeeds(const PixelGrid& grid, double spacing_m, int max_seeds);
 
 /// In each occupied voxel of side `spacing_m` the point nearest its centre.

@@ -30,7 +30,9 @@ enum class Neighborhood : std::uint8_t {
 };
 
 enum class SeedStrategy : std::uint8_t {
-  Grid, ///< uniform in the image (organized) or in a voxel grid
+  /// One spacing apart along the surface, near and far alike (organized), or in a voxel
+  /// grid.
+  Grid,
   Random, ///< uniform over the valid points
   Poisson ///< random, but no two closer than the spacing in metres
 };
@@ -41,9 +43,11 @@ struct SamplerOptions {
   int k = 100; ///< points of a Knn neighbourhood
   SeedStrategy strategy = SeedStrategy::Grid;
   int max_seeds = 0; ///< 0: as many as the spacing gives (Random: as many as on a Grid)
-  double spacing_m = 0.05; ///< between seeds (on a Grid: at the median depth)
+  double spacing_m = 0.05; ///< between seeds
   /// Stop when there are so many patches, when they cover this much surface, or after
-  /// this time; 0: never (sampling_budget.h).
+  /// this time; 0: never (sampling_budget.h). Where the number alone is limited, all
+  /// seeds are tried and the best patches taken, a spacing apart if there are enough;
+  /// streams (FrameExtractor) take what comes first.
   int max_patches = 0;
   double max_area_m2 = 0.0;
   double max_time_s = 0.0;

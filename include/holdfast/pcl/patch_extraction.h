@@ -26,13 +26,20 @@ struct ExtractionOptions {
   SamplerOptions sampler;
   FitOptions fit; ///< its viewpoint is set from the sensor pose and normal_side
   CovarianceMode covariance = CovarianceMode::Exact;
-  /// Limits that turn patches down; without any, patches are only measured, and with
-  /// nothing here, which saves a fifth of the time of a fit, not even that.
-  std::optional<ValidationOptions> validation;
+  /// Limits that turn patches down, by default what is no patch of that radius; with
+  /// nothing here, which saves a fifth of the time of a fit, patches are not even
+  /// measured.
+  std::optional<ValidationOptions> validation = ValidationOptions();
+  /// Patches of which better ones have more than this share of the points are left out;
+  /// 1: none are. Better means more of it covered by points, a chi-square nearer to
+  /// what it should be, a surer normal; so it does where a number of patches is wanted.
+  double max_overlap = 1.0;
   NormalSide normal_side = NormalSide::Viewpoint;
   /// Failed attempts stay among the patches, so that there is one for every seed that
   /// had its turn; isAccepted() tells them apart.
   bool keep_failures = false;
+  /// Patches that validation turned down stay among them, with their verdict.
+  bool keep_turned_down = false;
   int threads = 0; ///< 0: all cores
   Progress progress;
 };
@@ -45,6 +52,9 @@ struct ExtractedPatch {
   std::optional<int> seed_index;
   Eigen::Vector3d seed = Eigen::Vector3d::Zero();
   double radius_m = 0.0; ///< of the neighbourhood; 0: there was none
+  /// The neighbourhood turned out to be of more than one surface, and what is left of
+  /// it was fitted (NeighborhoodSampler::strictNeighborhood()).
+  bool is_second_attempt = false;
 };
 
 /// True when the fit came out and validation, if asked for, did not turn it down.
@@ -61,6 +71,7 @@ struct ExtractionResult {
   /// down.
   std::map<FitStatus, int> rejected;
   std::map<PatchVerdict, int> turned_down;
+  int second_attempts = 0; ///< patches that came of one
   PointAccounting points; ///< what became of the points of the cloud
   Sensor sensor; ///< whose noise was used, unless the cloud brought its covariances
   /// False when nobody said where the cloud was taken from and the points do not look
@@ -86,6 +97,8 @@ using NeighborhoodSearch =
 struct PatchSites {
   std::optional<std::vector<Seed>> seeds;
   NeighborhoodSearch search; ///< goes with seeds
+  /// A stricter search, tried where validation turned down a patch; may be none.
+  NeighborhoodSearch second_search;
 };
 
 /// The points of the cloud as seeds.

@@ -14,8 +14,28 @@
 
 namespace holdfast {
 
-/// Limits of what is accepted; a check without a limit always passes.
+/// Limits of what is accepted; a check without a limit always passes. The defaults are
+/// what a robot can rest on: a patch about as large as was asked for, that its points
+/// bear out. They are in terms of the radius of the neighbourhood and of the noise;
+/// those of the radius do not apply where there was none.
 struct ValidationOptions {
+  /// Largest Validation::extent_m over the radius. A full disc has 1; a neighbourhood
+  /// that noise or an edge has stretched by a third is another one than asked for.
+  std::optional<double> max_extent = 1.3;
+  /// Largest Validation::sagitta_m over the radius: a patch that bends by more than
+  /// half of it is a bowl or a ridge, and its paraboloid no longer follows the surface.
+  std::optional<double> max_sagitta = 0.5;
+  /// Largest magnitude of a principal curvature times the radius: a sphere of the
+  /// neighbourhood's own radius has 1, and all that is more was seen from its rim.
+  std::optional<double> max_bend = 1.0;
+  /// Largest SurfaceResidual::largest_m over the radius: a point that far off is an
+  /// obstacle or another surface. (Where the noise itself reaches that far, at 3 m and
+  /// 5 cm for a Kinect, the radius is too small for the sensor.)
+  std::optional<double> max_departure = 1.0 / 3.0;
+  /// Largest angle between the normal and the ray from the sensor, rad: 85 degrees. A
+  /// surface at a graze fills a pixel with a dozen of its widths; what normal comes out
+  /// is that of an edge or of the noise. Not asked where the viewpoint is unknown.
+  std::optional<double> max_view_angle_rad = 1.48;
   /// Largest magnitude of a principal curvature at the centre, 1/m: what a foot or hand
   /// can still rest on. (FitOptions has a limit of its own, far above, for what can be
   /// fitted.)
@@ -27,25 +47,35 @@ struct ValidationOptions {
   /// patch that is fitted to it, but 0.6 to 0.8 where that is a plane bounded by a
   /// rectangle or quad: bounds follow from moments, and reach beyond the points of a
   /// plane.
-  std::optional<double> min_coverage;
-  /// Largest chi-square per degree of freedom: misfit in units of the noise, 1 where
-  /// the surface and the noise model are right.
-  std::optional<double> max_chi2_per_dof;
+  /// The default leaves out patches of which half is guessed.
+  std::optional<double> min_coverage = 0.5;
+  /// Largest chi-square over what it should be: misfit in units of the noise, 1 where
+  /// the surface and the noise model are right. The default is beyond what noise does
+  /// to any patch, so that it selects by the surface alone, and lets pass a noise model
+  /// that is too small by 1.7.
+  std::optional<double> max_chi2_per_dof = 3.0;
   CoverageOptions coverage;
+
+  /// Nothing is turned down, all is measured.
+  static ValidationOptions withoutLimits();
 };
 
 /// Empty when the options make sense, else one sentence naming the first that does not.
 std::string validityError(const ValidationOptions& options);
 
-/// Outcome of the checks, in the order in which they are made; the first that fails
-/// counts.
+/// Outcome of the checks; the first that fails counts: extent, sagitta, curvature,
+/// view, residual, departure, coverage, chi-square.
 enum class PatchVerdict : std::uint8_t {
   Accepted,
   NotUsable, ///< the fit has no usable patch, or there is no finite point
   CurvatureTooLarge,
   ResidualTooLarge,
   CoverageTooLow,
-  ChiSquareTooLarge
+  ChiSquareTooLarge,
+  ExtentTooLarge,
+  SagittaTooLarge,
+  DepartureTooLarge, ///< a single point
+  NormalNotSeen ///< the surface is at a graze
 };
 
 /// "accepted", "curvature_too_large", ... as in the program's JSON.
@@ -56,6 +86,13 @@ std::string_view verdictName(PatchVerdict verdict);
 struct Validation {
   PatchVerdict verdict = PatchVerdict::NotUsable;
   double curvature_per_m = 0.0; ///< largest magnitude at the centre
+  /// Longer semi-axis of the uniform ellipse with the second moments of the patch's
+  /// support, m: of an evenly filled disc its radius.
+  double extent_m = 0.0;
+  /// By how much the surface rises at most over its tangent plane within the bounds, m:
+  /// the stronger curvature over the longer bound.
+  double sagitta_m = 0.0;
+  double view_angle_rad = 0.0; ///< zero where the viewpoint is unknown
   SurfaceResidual residual;
   Coverage coverage;
   double chi2_per_dof = 0.0; ///< zero without degrees of freedom
@@ -64,14 +101,18 @@ struct Validation {
 /// Checks a fit against the points it was made from. Takes no memory from the heap, and
 /// a fraction of the time of the fit.
 /// \param points the batch as PatchEstimator::estimate() left it.
+/// \param radius_m of the neighbourhood; 0: there was none.
 /// \throw std::invalid_argument when the options make no sense.
 Validation validate(const FitResult& fit,
                     const PointBatch& points,
-                    const ValidationOptions& options);
+                    const ValidationOptions& options,
+                    double radius_m = 0.0);
 
-/// \param points in world coordinates; those that are not finite are left out.
+/// \param points in world coordinates; those that are not finite are left out. Seen
+///        from an unknown viewpoint.
 Validation validate(const FitResult& fit,
                     const std::vector<Eigen::Vector3d>& points,
-                    const ValidationOptions& options);
+                    const ValidationOptions& options,
+                    double radius_m = 0.0);
 
 } // namespace holdfast

@@ -6,11 +6,15 @@
 
 namespace holdfast {
 
-inline constexpr EnumNames<PatchVerdict, 6> kVerdictNames{{"accepted",
-                                                           "not_usable",
-                                                           "curvature_too_large",
-                                                           "residual_too_large",
-                                                           "coverage_too_low",
-                                                           "chi_square_too_large"}};
+inline constexpr EnumNames<PatchVerdict, 10> kVerdictNames{{"accepted",
+                                                            "not_usable",
+                                                            "curvature_too_large",
+                                                            "residual_too_large",
+                                                            "coverage_too_low",
+                                                            "chi_square_too_large",
+                                                            "extent_too_large",
+                                                            "sagitta_too_large",
+                                                            "departure_too_large",
+                                                            "normal_not_seen"}};
 
 } // namespace holdfast
