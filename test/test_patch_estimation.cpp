@@ -425,7 +425,7 @@ TEST(Validation, TurnsPatchesDownWithTheReason)
   estimation.compute(patches);
   ASSERT_TRUE(patches.is_dense);
   EXPECT_TRUE(std::isnan(patches[0].coverage)); // not even measured
-  ValidationOptions limits;
+  ValidationOptions limits = ValidationOptions::withoutLimits();
   estimation.setValidationOptions(limits);
   estimation.compute(patches);
   ASSERT_TRUE(patches.is_dense);
