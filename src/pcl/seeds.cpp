@@ -154,15 +154,6 @@ private:
   CellMap<std::vector<Eigen::Vector3d>> buckets_;
 };
 
-/// Whole pixels that a share of the spacing is at a depth, at least one.
-int
-stepAt(float depth, double spacing, double focal)
-{
-  constexpr double kShare = 0.25;
-  constexpr double kMost = 1e6; // wider than images are
-  return static_cast<int>(std::clamp(kShare * spacing * focal / depth, 1.0, kMost));
-}
-
 /// The nearest valid depth; infinite without any.
 float
 nearestDepth(const PixelGrid& grid)
@@ -174,6 +165,81 @@ nearestDepth(const PixelGrid& grid)
   return nearest;
 }
 
+/// Seeds on the pixels of a camera, in lists by cells of the image.
+class SeedsInImage {
+public:
+  SeedsInImage(const PixelGrid& grid, double spacing, int cell_px)
+  : grid_(grid)
+  , spacing_(spacing)
+  , cell_px_(cell_px)
+  , columns_((grid.camera.width + cell_px - 1) / cell_px)
+  , rows_((grid.camera.height + cell_px - 1) / cell_px)
+  , first_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_), kNone)
+  {}
+
+  /// Adds the pixel unless a seed is nearer than the spacing. \return the distance to
+  /// one such seed, 0 when there is none.
+  double addIfFree(int u, int v)
+  {
+    const Eigen::Vector3d p = pointAt(u, v);
+    const PixelWindow window = grid_.ballWindow(p, spacing_);
+    const auto cells = [this](const PixelRange& pixels, int count) {
+      return PixelRange{pixels.begin / cell_px_,
+                        std::min((pixels.end - 1) / cell_px_ + 1, count)};
+    };
+    const PixelRange columns = cells(window.columns, columns_);
+    const PixelRange rows = cells(window.rows, rows_);
+    for (int row = rows.begin; row < rows.end; ++row)
+      for (int column = columns.begin; column < columns.end; ++column)
+        for (int i = first_[cellAt(column, row)]; i != kNone; i = seeds_[i].next) {
+          const double squared = (seeds_[i].point - p).squaredNorm();
+          if (squared < spacing_ * spacing_)
+            return std::sqrt(squared);
+        }
+    int& first = first_[cellAt(u / cell_px_, v / cell_px_)];
+    seeds_.push_back({p, v * grid_.camera.width + u, first});
+    first = static_cast<int>(seeds_.size()) - 1;
+    return 0.0;
+  }
+
+  std::vector<int> pixels() const
+  {
+    std::vector<int> pixels;
+    for (const Seed& seed : seeds_)
+      pixels.push_back(seed.pixel);
+    return pixels;
+  }
+
+private:
+  static constexpr int kNone = -1;
+
+  struct Seed {
+    Eigen::Vector3d point;
+    int pixel;
+    int next; ///< in the same cell
+  };
+
+  Eigen::Vector3d pointAt(int u, int v) const
+  {
+    const Camera& camera = grid_.camera;
+    return grid_.row(v)[u] * Eigen::Vector3d((u - camera.cx) / camera.fx,
+                                             (v - camera.cy) / camera.fy,
+                                             1.0);
+  }
+
+  std::size_t cellAt(int column, int row) const
+  {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
+           static_cast<std::size_t>(column);
+  }
+
+  const PixelGrid& grid_;
+  double spacing_;
+  int cell_px_, columns_, rows_;
+  std::vector<int> first_;
+  std::vector<Seed> seeds_;
+};
+
 /// Pixels in the order of rows, each unless one before is nearer in space. Steps of a
 /// quarter of the spacing find nearly as many as all pixels would.
 std::vector<int>
@@ -183,29 +249,27 @@ spacedPixels(const PixelGrid& grid, double spacing)
   const float nearest = nearestDepth(grid);
   if (std::isinf(nearest))
     return {};
-  SpacedPoints kept(spacing);
-  std::vector<int> seeds;
-  // Rows as dense as the farthest pixels of a room want them, not denser than one by
-  // one.
-  constexpr float kDeepest = 4.0F; // times the nearest
-  const int row_step = stepAt(kDeepest * nearest, spacing, camera.fy);
+  // Rows as dense as the farthest pixels of a room want them.
+  constexpr double kDeepest = 4.0; // times the nearest
+  constexpr double kMostPixels = 1e6; // wider than images are
+  const auto pixelsOf = [=](double length, double focal, double depth) {
+    return static_cast<int>(std::clamp(length * focal / depth, 1.0, kMostPixels));
+  };
+  const int row_step = pixelsOf(0.25 * spacing, camera.fy, kDeepest * nearest);
+  SeedsInImage seeds(grid, spacing, pixelsOf(spacing, camera.fx, kDeepest * nearest));
   for (int v = row_step / 2; v < camera.height; v += row_step) {
     const float* row = grid.row(v);
     for (int u = 0; u < camera.width;) {
-      const float z = row[u];
-      if (std::isnan(z)) {
+      if (std::isnan(row[u])) {
         ++u;
         continue;
       }
-      const Eigen::Vector3d p = z * Eigen::Vector3d((u - camera.cx) / camera.fx,
-                                                    (v - camera.cy) / camera.fy,
-                                                    1.0);
-      if (kept.addIfFree(p))
-        seeds.push_back(v * camera.width + u);
-      u += stepAt(z, spacing, camera.fx);
+      // What lies d from a seed is free after spacing - d at the earliest.
+      const double blocked = seeds.addIfFree(u, v);
+      u += pixelsOf(std::max(0.25 * spacing, spacing - blocked), camera.fx, row[u]);
     }
   }
-  return seeds;
+  return seeds.pixels();
 }
 
 } // namespace

@@ -101,13 +101,15 @@ wholeChain(benchmark::State& state, const Sensor& sensor, int points, int thread
   std::size_t seeds = once.patches.size();
   for (const auto& rejected : once.rejected)
     seeds += static_cast<std::size_t>(rejected.second);
+  for (const auto& turned_down : once.turned_down)
+    seeds += static_cast<std::size_t>(turned_down.second);
   measure(
       state,
       seeds,
       [&] { benchmark::DoNotOptimize(extractPatches(scene().cloud, sensor, options)); },
       threads == 1 ? Clock::Processor : Clock::Wall);
   state.counters["points"] = meanSize(scene(), options.sampler);
-  state.counters["usable"] =
+  state.counters["accepted"] =
       static_cast<double>(once.patches.size()) / static_cast<double>(seeds);
 }
 
