@@ -337,8 +337,9 @@ TEST(ExtractPatches, AsksModelsThatLookAtNeighborsForTheWholeImage)
   for (Eigen::Matrix3f& S : with.covariances)
     S = (pose.R.cast<float>() * S * pose.R.cast<float>().transpose()).eval();
   ExtractionOptions options = makeOptions(0.08, 0.25);
-  // Cut by slope alone, since the depth noise of a single point is not that of the
-  // image.
+  // Discs, and cut by slope alone, since the depth noise of a single point is not that
+  // of the image.
+  options.sampler.neighborhood = Neighborhood::Disc;
   options.sampler.jump_sigmas = 0.0;
   options.sampler.max_slope = 10.0;
   expectSameBits(extractPatches(cloud, sensor, options),

@@ -35,7 +35,7 @@ run pattern consistency --trials 1000 --seed 7 --scene sweep-1.0 --sensor xtion
 # The paper's table and figures, and two questions it leaves open.
 run . table1 --trials 10000 --seed 7
 run . figure5 --trials 5000 --seed 7
-run . neighborhoods --trials 5000 --seed 7
+run . neighborhoods --trials 500 --seed 7
 if [[ -n $recordings ]]; then
   ln -s "$recordings" recordings
   run . figure6 --data recordings

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
 # Makes every picture of this folder anew, in seconds.
 #
-#   samples/pictures/run.sh HOLDFAST [mosd_cyl_learn44.pcd]     the program, and for the
-#                                                               table its recording
+#   samples/pictures/run.sh HOLDFAST [RECORDINGS]     the program, and for the table and
+#                                                     the carpet the folder of recordings
 set -euo pipefail
 holdfast=$(realpath "$1")
-recording=${2:+$(realpath "$2")}
+recordings=${2:+$(realpath "$2")}
 here=$(dirname "$(realpath "${BASH_SOURCE[0]}")")
 
 work=$(mktemp -d)
@@ -19,9 +19,13 @@ cd "$work"
 "$holdfast" render rocks.patches.json -o "$here/rocks_sigma.png" --size 800x610 \
   --color sigma-normal
 
-[[ -n $recording ]] || exit 0
-for kind in "" _independent; do
-  "$holdfast" fit "$recording" --sensor xtion ${kind:+--no-pattern} -o . --quiet
-  "$holdfast" render "$(basename "$recording" .pcd).patches.json" \
-    -o "$here/table$kind.png" --size 800x600
-done
+[[ -n $recordings ]] || exit 0
+# picture RECORDING NAME [options of fit]
+picture() {
+  "$holdfast" fit "$recordings/$1.pcd" -o . --quiet "${@:3}"
+  "$holdfast" render "$1.patches.json" -o "$here/$2.png" --size 800x600
+}
+picture mosd_cyl_learn44 table --sensor xtion
+picture mosd_cyl_learn44 table_independent --sensor xtion --no-pattern
+picture pcl_milk_clorox_carpet carpet
+picture pcl_milk_clorox_carpet carpet_discs --neighborhood disc --accept all

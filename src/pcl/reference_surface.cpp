@@ -10,10 +10,14 @@ namespace holdfast {
 namespace {
 
 // Least squares for n of the monomials 1 s t ss st tt, in units in which the samples
-// spread over about one.
+// spread over about one. What the coefficients explain of the sum of squares is in
+// `explained`.
 template <int n>
 bool
-solve(const RaySamples& samples, double scale, std::array<double, 6>& h)
+solve(const RaySamples& samples,
+      double scale,
+      std::array<double, 6>& h,
+      double& explained)
 {
   using Matrix = Eigen::Matrix<double, n, n>;
   using Vector = Eigen::Matrix<double, n, 1>;
@@ -25,10 +29,15 @@ solve(const RaySamples& samples, double scale, std::array<double, 6>& h)
     const double monomials[6] = {1.0, s, t, s * s, s * t, t * t};
     for (int j = 0; j < n; ++j)
       rows(i, j) = monomials[j];
-    rows(i, n) = samples.inverse_depth[i];
+    // Less the first, so that the sums of squares keep their digits.
+    rows(i, n) = samples.inverse_depth[i] - samples.inverse_depth[0];
   }
+  // Column by column: Eigen's product of matrices this narrow costs twice as much.
   const auto used = rows.topRows(count);
-  const Eigen::Matrix<double, n + 1, n + 1> sums = used.transpose() * used;
+  Eigen::Matrix<double, n + 1, n + 1> sums;
+  for (int i = 0; i <= n; ++i)
+    for (int j = i; j <= n; ++j)
+      sums(i, j) = sums(j, i) = used.col(i).dot(used.col(j));
   const Matrix A = sums.template topLeftCorner<n, n>();
   const Vector b = sums.template topRightCorner<n, 1>();
   const Eigen::LLT<Matrix> cholesky(A);
@@ -37,7 +46,9 @@ solve(const RaySamples& samples, double scale, std::array<double, 6>& h)
   if (cholesky.info() != Eigen::Success ||
       cholesky.matrixLLT().diagonal().cwiseAbs2().minCoeff() < kSmallestPivot * count)
     return false;
-  const Vector x = cholesky.solve(b);
+  Vector x = cholesky.solve(b);
+  explained = x.dot(b);
+  x[0] += samples.inverse_depth[0];
   const double area = scale * scale;
   const double units[6] = {1.0, scale, scale, area, area, area};
   for (int i = 0; i < 6; ++i)
@@ -61,23 +72,43 @@ ReferenceSurface::ReferenceSurface(const Eigen::Vector2d& ray, double depth_m)
 {}
 
 bool
-ReferenceSurface::fit(const RaySamples& samples, int order)
+ReferenceSurface::fitPlane(const RaySamples& samples)
+{
+  constexpr int kFew = 5;
+  const double scale = spread(samples);
+  double explained = 0.0;
+  std::array<double, 6> h{};
+  return samples.size >= kFew && scale > 0.0 &&
+         solve<3>(samples, scale, h, explained) && take(h);
+}
+
+bool
+ReferenceSurface::fitQuadric(const RaySamples& samples, double sigma)
 {
   // Fewer say little about the curvature.
-  constexpr int kFewForSecondOrder = 15, kFewForFirstOrder = 5;
-  if (samples.size < kFewForFirstOrder)
-    return false;
-  std::array<double, 6> h = h_;
+  constexpr int kFew = 15;
+  // Chi-square of the three terms of second order, exceeded by noise in one of a
+  // hundred.
+  constexpr double kSignificant = 11.3;
+  if (samples.size < kFew)
+    return fitPlane(samples);
   const double scale = spread(samples);
-  if (!(scale > 0.0))
+  std::array<double, 6> plane{}, quadric{};
+  double by_plane = 0.0, by_quadric = 0.0;
+  if (!(scale > 0.0) || !solve<3>(samples, scale, plane, by_plane))
     return false;
-  const bool second = order > 1 && samples.size >= kFewForSecondOrder;
-  if (!(second && solve<6>(samples, scale, h)) && !solve<3>(samples, scale, h))
-    return false;
-  if (!(h[0] > 0.0)) // behind the camera
-    return false;
-  h_ = h;
-  return true;
+  const bool bends = solve<6>(samples, scale, quadric, by_quadric) &&
+                     by_quadric - by_plane > kSignificant * sigma * sigma;
+  return take(bends ? quadric : plane);
+}
+
+bool
+ReferenceSurface::take(const std::array<double, 6>& h)
+{
+  const bool before_camera = h[0] > 0.0;
+  if (before_camera)
+    h_ = h;
+  return before_camera;
 }
 
 Eigen::Vector3d

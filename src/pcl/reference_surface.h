@@ -17,7 +17,7 @@ namespace holdfast {
 /// 1/m.
 struct RaySamples {
   /// More hardly improve the surface, whose errors count only by the slope.
-  static constexpr int kMost = 48;
+  static constexpr int kMost = 96;
 
   int size = 0;
   double s[kMost], t[kMost], inverse_depth[kMost];
@@ -35,9 +35,14 @@ public:
   /// \param ray x/z and y/z of the seed
   ReferenceSurface(const Eigen::Vector2d& ray, double depth_m);
 
-  /// Least squares, of second order where there are points enough for it, else of first
-  /// order. \return false, and nothing changed, where the points do not tell it.
-  bool fit(const RaySamples& samples, int order);
+  /// Least squares: a plane. \return false, and nothing changed, where the points do
+  /// not tell one.
+  bool fitPlane(const RaySamples& samples);
+
+  /// A quadric where the samples tell that the surface is no plane, else a plane: what
+  /// they do not tell would make the choice of points follow the noise.
+  /// \param sigma of 1/z, 1/m. \return as fitPlane().
+  bool fitQuadric(const RaySamples& samples, double sigma);
 
   /// 1/z along a ray.
   double inverseDepth(double s, double t) const
@@ -63,6 +68,8 @@ public:
   Eigen::Vector3d normal() const;
 
 private:
+  bool take(const std::array<double, 6>& h);
+
   Eigen::Vector2d ray_;
   std::array<double, 6> h_{};
 };

@@ -14,9 +14,6 @@ constexpr double kFirstShare = 0.35;
 // Pixels of that disc to every side, at least: noise tilts the plane of fewer.
 constexpr double kFirstPixels = 3.0;
 
-// Of the radius: the disc on the surface that tells how it is curved.
-constexpr double kSecondShare = 0.75;
-
 // A neighbour may leave the surface by this times their distance, 45 degrees against
 // it.
 constexpr double kSlope = 1.0;
@@ -43,7 +40,7 @@ double
 fittedRadius(const SurfacePatchSettings& settings)
 {
   return settings.strictness == Strictness::Strict ? 0.5 * settings.radius_m :
-                                                     kSecondShare * settings.radius_m;
+                                                     settings.radius_m;
 }
 
 // So that no more samples are taken of so many.
@@ -130,23 +127,14 @@ public:
     return {(u0_ - camera.cx) / camera.fx, (v0_ - camera.cy) / camera.fy};
   }
 
-  // Through some of the pixels, which ascend.
-  void fitSurface(const std::vector<int>& pixels, int order)
+  void fitPlane(const std::vector<int>& pixels)
   {
-    const Camera& camera = grid_.camera;
-    const auto step = stepOver(pixels.size());
-    RaySamples samples;
-    int row = 0, row_begin = 0;
-    for (std::size_t i = step / 2; i < pixels.size(); i += step) {
-      if (pixels[i] >= row_begin + camera.width) {
-        row = pixels[i] / camera.width;
-        row_begin = row * camera.width;
-      }
-      samples.add((pixels[i] - row_begin - u0_) / camera.fx,
-                  (row - v0_) / camera.fy,
-                  1.0 / grid_.depth[static_cast<std::size_t>(pixels[i])]);
-    }
-    surface_.fit(samples, order);
+    surface_.fitPlane(samplesOf(pixels));
+  }
+
+  void fitQuadric(const std::vector<int>& pixels)
+  {
+    surface_.fitQuadric(samplesOf(pixels), sigma_);
   }
 
   // The connected pixels within a radius on the surface found so far.
@@ -182,6 +170,25 @@ public:
   }
 
 private:
+  // Some of the pixels, which ascend.
+  RaySamples samplesOf(const std::vector<int>& pixels) const
+  {
+    const Camera& camera = grid_.camera;
+    const auto step = stepOver(pixels.size());
+    RaySamples samples;
+    int row = 0, row_begin = 0;
+    for (std::size_t i = step / 2; i < pixels.size(); i += step) {
+      if (pixels[i] >= row_begin + camera.width) {
+        row = pixels[i] / camera.width;
+        row_begin = row * camera.width;
+      }
+      samples.add((pixels[i] - row_begin - u0_) / camera.fx,
+                  (row - v0_) / camera.fy,
+                  1.0 / grid_.depth[static_cast<std::size_t>(pixels[i])]);
+    }
+    return samples;
+  }
+
   PixelJump jump() const
   {
     const double noise = settings_.jump_sigmas * sigma_;
@@ -251,12 +258,12 @@ surfacePatch(const PixelGrid& grid,
                 limit,
                 scratch.runs,
                 scratch.pixels);
-  search.fitSurface(scratch.pixels, 1);
+  search.fitPlane(scratch.pixels);
   const double departure = largestDeparture(settings, sigma_z);
   search.collect(fittedRadius(settings),
                  std::max(kLargestDeparture * radius, departure),
                  scratch.pixels);
-  search.fitSurface(scratch.pixels, 2);
+  search.fitQuadric(scratch.pixels);
   search.collect(radius, departure, indices);
   // The seed itself may be an outlier of its surface.
   if (indices.empty())
@@ -276,13 +283,12 @@ struct Rays {
   }
 };
 
-// Through some of the candidates within a disc on the surface found so far.
-void
-fitWithin(double radius_m,
-          const Rays& rays,
-          int order,
-          std::vector<int>& members,
-          ReferenceSurface& surface)
+// Some of the candidates within a disc on the surface found so far.
+RaySamples
+samplesWithin(double radius_m,
+              const Rays& rays,
+              const ReferenceSurface& surface,
+              std::vector<int>& members)
 {
   const LateralDisc disc(surface, radius_m);
   members.clear();
@@ -298,7 +304,7 @@ fitWithin(double radius_m,
     const Eigen::Vector2d slopes = rays.slopes(member);
     samples.add(slopes.x(), slopes.y(), 1.0 / rays.points[member].z());
   }
-  surface.fit(samples, order);
+  return samples;
 }
 
 } // namespace
@@ -315,8 +321,11 @@ surfaceMembers(const Eigen::Vector3d& seed,
   ReferenceSurface surface(ray, seed.z());
   const Rays rays{ray, candidates};
   const double radius = settings.radius_m;
-  fitWithin(kFirstShare * radius, rays, 1, scratch.members, surface);
-  fitWithin(fittedRadius(settings), rays, 2, scratch.members, surface);
+  const double sigma = sigma_z / (seed.z() * seed.z());
+  surface.fitPlane(samplesWithin(kFirstShare * radius, rays, surface, scratch.members));
+  surface.fitQuadric(
+      samplesWithin(fittedRadius(settings), rays, surface, scratch.members),
+      sigma);
   const LateralDisc within(surface, radius);
   const double gate = largestDeparture(settings, sigma_z) / (seed.z() * seed.z());
   belongs.assign(candidates.size(), false);
