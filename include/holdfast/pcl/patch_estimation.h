@@ -25,10 +25,10 @@ namespace holdfast {
 /// Seeds are the indices; without any, those a NeighborhoodSampler chooses if
 /// setSeedsFromSampler() asks for it, else all points.
 ///
-/// Neighbourhoods come from a NeighborhoodSampler: for organized clouds the image of a
-/// disc of the radius, which is unbiased where a ball cuts the noise tails; for k
-/// instead of a radius, the k nearest points. With setSearchMethod() or
-/// setSearchSurface() they come from PCL's search instead, as in any feature.
+/// Neighbourhoods come from a NeighborhoodSampler: the points whose rays meet the
+/// surface around the seed within the radius, which is unbiased where a ball cuts the
+/// noise tails; for k instead of a radius, the k nearest points. With setSearchMethod()
+/// or setSearchSurface() they come from PCL's search instead, as in any feature.
 ///
 /// The noise of the points comes from setInputCovariances(), else from the points
 /// themselves (PointXYZCovariance), else from the model of the sensor. One of them is
@@ -36,10 +36,11 @@ namespace holdfast {
 /// normals: see setSensorPose().
 ///
 /// The output has one point per seed. Where no patch was found, or validation turned it
-/// down, the point is NaN, its fields `status` and `verdict` tell why, and the cloud is
-/// not dense. Misuse (no input, indices out of range, radius and k both set,
-/// covariances of another number than the points, ...) is reported by PCL_ERROR, and
-/// the output is empty. Nothing throws.
+/// down (as it does by default what is no patch of that radius, ValidationOptions), the
+/// point is NaN, its fields `status` and `verdict` tell why, and the cloud is not
+/// dense. Misuse (no input, indices out of range, radius and k both set, covariances of
+/// another number than the points, ...) is reported by PCL_ERROR, and the output is
+/// empty. Nothing throws.
 ///
 /// \tparam PointOutT PatchPoint, or any point type that shares fields with it.
 template <typename PointInT, typename PointOutT = PatchPoint>
