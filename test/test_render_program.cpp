@@ -13,6 +13,7 @@
 #include <array>
 #include <cstdlib>
 #include <filesystem>
+#include <limits>
 #include <set>
 #include <string>
 #include <vector>
@@ -240,6 +241,30 @@ TEST_F(RenderProgram, PointsKeepTheColorsOfTheFile)
   // The discs of 1199 points that far apart have the largest radius, 5 px; one patch
   // covers some of them.
   EXPECT_GT(picture.count({255, 0, 255}), 1199 * 78 / 2);
+}
+
+// Glass would cover a hole in the cloud; its pixels are those of the background.
+TEST_F(RenderProgram, WhatNoPointsSupportIsLeftOut)
+{
+  RangeCloud cloud = test::bowlCloud(40, 30);
+  saveCloud(folder_ + "/bowl.pcd", cloud);
+  const test::ProgramRun run = test::runProgram(
+      folder_,
+      {"fit", folder_ + "/bowl.pcd", "--whole", "--accept", "all", "-o", folder_});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  auto holed = pcl::make_shared<pcl::PointCloud<pcl::PointXYZ>>(*cloud.points);
+  for (int v = 8; v < 22; ++v)
+    for (int u = 12; u < 28; ++u)
+      (*holed)(u, v).x = (*holed)(u, v).y = (*holed)(u, v).z =
+          std::numeric_limits<float>::quiet_NaN();
+  cloud.points = holed;
+  saveCloud(folder_ + "/holed.pcd", cloud);
+  const auto drawn = [&](const std::string& name) {
+    return render({folder_ + "/bowl.patches.json", "--cloud", folder_ + "/" + name})
+        .countOther(kWhite);
+  };
+  // The hole is a fifth of the cloud; cells at its rim have points.
+  EXPECT_LT(drawn("holed.pcd"), 0.9 * drawn("bowl.pcd"));
 }
 
 TEST_F(RenderProgram, SeveralResultsGiveASheet)

@@ -298,8 +298,9 @@ drawSubject(Canvas& canvas,
     if (const auto at = view.project(patch.fit.patch.c))
       from_afar.emplace_back(at->nearness, &patch.fit);
   std::sort(from_afar.begin(), from_afar.end());
+  const PatchSupport support(subject.points.positions);
   for (const auto& [nearness, fit] : from_afar)
-    drawPatch(canvas, view, fit->patch, colors(*fit));
+    drawPatch(canvas, view, fit->patch, support.of(fit->patch), colors(*fit));
 }
 
 void

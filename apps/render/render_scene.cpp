@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numeric>
 
@@ -157,7 +158,8 @@ drawMesh(Canvas& canvas,
          const Mesh& mesh,
          const std::vector<ScreenPoint>& points,
          const Rgb& color,
-         double opacity)
+         double opacity,
+         const std::function<bool(const Eigen::Vector3d&)>& is_drawn = {})
 {
   for (const std::array<int, 3>& triangle : mesh.triangles) {
     std::array<Eigen::Vector3d, 3> corners;
@@ -166,6 +168,8 @@ drawMesh(Canvas& canvas,
       corners[i] = mesh.vertices[static_cast<std::size_t>(triangle[i])];
       on_canvas[i] = points[static_cast<std::size_t>(triangle[i])];
     }
+    if (is_drawn && !is_drawn((corners[0] + corners[1] + corners[2]) / 3.0))
+      continue;
     const Eigen::Vector3d normal =
         (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalized();
     canvas.drawTriangle(on_canvas,
@@ -281,7 +285,11 @@ drawPoints(Canvas& canvas,
 }
 
 void
-drawPatch(Canvas& canvas, const View& view, const Patch& patch, const Rgb& color)
+drawPatch(Canvas& canvas,
+          const View& view,
+          const Patch& patch,
+          const SupportedCells& support,
+          const Rgb& color)
 {
   constexpr double kStandOff = 0.25; // of the half-length
   constexpr double kOpacity = 0.7;
@@ -290,7 +298,10 @@ drawPatch(Canvas& canvas, const View& view, const Patch& patch, const Rgb& color
   const auto points = projectAll(view, mesh.vertices, kStandOff * halfLength(patch));
   if (!points)
     return;
-  drawMesh(canvas, view, mesh, *points, color, kOpacity);
+  const Pose pose = patch.pose();
+  drawMesh(canvas, view, mesh, *points, color, kOpacity, [&](const Eigen::Vector3d& p) {
+    return support.contains(pose.toLocal(p).head<2>());
+  });
   drawOutline(canvas, *points, outlineLength(patch, spacing), scaled(color, 0.6));
 }
 

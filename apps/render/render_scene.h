@@ -1,6 +1,7 @@
 /// \file What a picture shows: clouds and patches.
 #pragma once
 
+#include "patch_support.h"
 #include "view.h"
 
 #include <holdfast/patch/patch.h>
@@ -21,8 +22,12 @@ void drawPoints(Canvas& canvas,
 
 /// Draws a patch as tinted glass with an outline. It stands off its surface by a
 /// fraction of its size, so that the noise of the points it is fitted to does not cover
-/// it but other things do.
-void drawPatch(Canvas& canvas, const View& view, const Patch& patch, const Rgb& color);
+/// it but other things do. Where no points support it there is the outline alone.
+void drawPatch(Canvas& canvas,
+               const View& view,
+               const Patch& patch,
+               const SupportedCells& support,
+               const Rgb& color);
 
 /// Draws a patch as a solid sheet with lines of constant x and y, and its axes: x red,
 /// y green, z blue.
