@@ -107,8 +107,12 @@ summaryTable(const PatchReport& report)
   for (const auto& [surface, fits] : by_surface)
     rows.push_back(tableRow(surface, fits));
   const std::string rejected = rejectedText(report.result);
+  const int second = report.result.second_attempts;
   return heading(report) + formatTable(rows) +
-         (rejected.empty() ? "" : "rejected: " + rejected + "\n");
+         (rejected.empty() ? "" : "rejected: " + rejected + "\n") +
+         (second == 0 ? "" :
+                        "of several surfaces, fitted to the seed's alone: " +
+                            std::to_string(second) + "\n");
 }
 
 } // namespace holdfast::app

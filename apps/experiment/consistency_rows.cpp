@@ -148,7 +148,9 @@ describePatches(int trials, bool shared_errors, Report& report)
                          {"sigma max", "sigma_ratio_max"},
                          {"bias", "bias_after_shift_max"},
                          {"type errors", "type_error_rate"},
-                         {"failures", "failure_rate"}});
+                         {"failures", "failure_rate"},
+                         {"over an edge", "over_edge"},
+                         {"covered", "covered"}});
   report.remarks.push_back(
       "NEES/dof: squared error about the noise-free fit, normalised by the predicted "
       "covariance; 1 is right, and a Monte Carlo of this size gives it to about +-" +
@@ -199,7 +201,10 @@ describeClouds(Report& report)
       "without whose axes came out turned by more than 45 degrees, left out. other "
       "type: the noise-free points choose another one; selection of the type is in no "
       "covariance, and these are not judged. no reference: the noise-free points "
-      "determine no patch. Patches that overlap share errors, so that a frame tells "
+      "determine no patch. over an edge: share of the accepted patches that leave the "
+      "true surface by more than four sigmas of a point in a twentieth of their area. "
+      "covered: share of the smooth surface that lies on one. Patches that overlap "
+      "share errors, so that a frame tells "
       "less than its number of patches.");
 }
 

@@ -190,6 +190,8 @@ checkFrame(const RangeImage& image,
   for (const auto& [verdict, count] : result.turned_down)
     check.failures += count;
   check.seeds = static_cast<int>(result.patches.size()) + check.failures;
+  check.truth =
+      compareWithTruth(image, sensor, result.patches, options.sampler.radius_m);
   for (const ExtractedPatch& patch : result.patches)
     judge(patch.fit, referee.fitFor(patch), check.types[indexOf(patch.fit.patch.type)]);
   return check;
@@ -246,6 +248,7 @@ addTo(CloudCheck& all, const CloudCheck& one)
   all.frames += one.frames;
   all.seeds += one.seeds;
   all.failures += one.failures;
+  all.truth += one.truth;
   for (const auto& [type, tally] : one.types)
     addTo(all.types[type], tally);
 }
@@ -330,6 +333,9 @@ rowsOf(const CloudCheck& check)
   std::vector<Json> rows{rowOf(check, "all", all)};
   rows.front()["seeds"] = check.seeds;
   rows.front()["failure_rate"] = share(check.failures, check.seeds);
+  const TruthTally& truth = check.truth;
+  rows.front()["over_edge"] = share(truth.over_edge, truth.patches);
+  rows.front()["covered"] = share(truth.covered_pixels, truth.smooth_pixels);
   for (const auto& [type, tally] : check.types)
     rows.push_back(
         rowOf(check, typeName(kPatchTypes[static_cast<std::size_t>(type)]), tally));

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "experiment.h"
+#include "truth_check.h"
 
 #include <holdfast/evaluation/consistency.h>
 #include <holdfast/fit/options.h>
@@ -40,6 +41,7 @@ struct CloudCheck {
   int frames = 0;
   int seeds = 0;
   int failures = 0; ///< seeds without an accepted patch
+  TruthTally truth; ///< of the accepted ones against the true surface
   std::map<int, CloudTally> types; ///< by index in kPatchTypes
 };
 
