@@ -250,6 +250,11 @@ addValidationOptions(CLI::App& command, ExtractionSettings& settings)
       CLI::Range(0.0, 1.0, "SHARE"),
       "Turn down patches of which points support a smaller share, 0 to 1 (default "
       "0.5)");
+  add("--max-stray",
+      limits.max_stray,
+      positiveNumber("SHARE"),
+      "Turn down patches of which a larger share of the pixels that see them measured "
+      "points elsewhere (default 0.02)");
   add("--max-chi2",
       limits.max_chi2_per_dof,
       positiveNumber("RATIO"),

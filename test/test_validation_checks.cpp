@@ -215,9 +215,9 @@ TEST(Verdicts, OnPointsBeyondAllReasonAreNotAccepted)
 TEST(Verdicts, HaveNamesOfTheirOwn)
 {
   std::set<std::string_view> names;
-  for (int i = 0; i <= static_cast<int>(PatchVerdict::NormalNotSeen); ++i)
+  for (int i = 0; i <= static_cast<int>(PatchVerdict::OverEdge); ++i)
     names.insert(verdictName(static_cast<PatchVerdict>(i)));
-  EXPECT_EQ(names.size(), 10u);
+  EXPECT_EQ(names.size(), 11u);
   EXPECT_EQ(verdictName(PatchVerdict::Accepted), "accepted");
   EXPECT_EQ(verdictName(PatchVerdict::ChiSquareTooLarge), "chi_square_too_large");
 }
@@ -287,6 +287,7 @@ TEST(ValidationOptionsCheck, NamesWhatIsWrong)
     expectError(&ValidationOptions::max_sagitta, bad, "max_sagitta");
     expectError(&ValidationOptions::max_bend, bad, "max_bend");
     expectError(&ValidationOptions::max_departure, bad, "max_departure");
+    expectError(&ValidationOptions::max_stray, bad, "max_stray");
     expectError(&ValidationOptions::max_view_angle_rad, bad, "max_view_angle_rad");
   }
   for (const double bad : {-0.1, 1.1, nan})

@@ -174,6 +174,7 @@ validationJson(const std::optional<ValidationOptions>& validation)
           {"max_sagitta", optionalJson(validation->max_sagitta)},
           {"max_bend", optionalJson(validation->max_bend)},
           {"max_departure", optionalJson(validation->max_departure)},
+          {"max_stray", optionalJson(validation->max_stray)},
           {"max_view_angle", optionalJson(validation->max_view_angle_rad)},
           {"max_curvature", optionalJson(validation->max_curvature_per_m)},
           {"max_residual", optionalJson(validation->max_residual_m)},

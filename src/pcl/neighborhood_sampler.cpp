@@ -7,6 +7,8 @@
 #include "seeds.h"
 #include "surface_patch.h"
 
+#include <holdfast/patch/surface.h>
+
 #include <pcl/common/point_tests.h>
 #include <pcl/kdtree/kdtree_flann.h>
 
@@ -87,6 +89,8 @@ struct NeighborhoodSampler::Impl {
                 std::vector<int>& indices) const;
   void gridGeodesic(int seed, Scratch& scratch, std::vector<int>& indices) const;
   void treeGeodesic(int seed, Scratch& scratch, std::vector<int>& indices) const;
+
+  double strayShare(int seed, const Patch& patch) const;
 
   Eigen::Vector3d inCamera(int index) const;
   PixelWindow windowAround(int seed) const;
@@ -547,6 +551,44 @@ NeighborhoodSampler::Impl::neighborhood(int seed,
   case Neighborhood::Knn:
     return knn(seed, scratch, indices);
   }
+}
+
+double
+NeighborhoodSampler::Impl::strayShare(int seed, const Patch& patch) const
+{
+  constexpr double kPixels = 100.0, kSigmas = 4.0;
+  const Pose& pose = cloud.sensor_pose;
+  const Camera& camera = grid->camera;
+  const PixelWindow window =
+      grid->ballWindow(pose.toLocal(patch.c), patch.d.head<4>().maxCoeff());
+  const int columns = window.columns.end - window.columns.begin;
+  const int rows = window.rows.end - window.rows.begin;
+  const double pixels = static_cast<double>(columns) * rows;
+  const int step = std::max(1, static_cast<int>(std::sqrt(pixels / kPixels)));
+  const double z = inCamera(seed).z();
+  const double sigma = depthSigma(seed) / (z * z); // of 1/z
+  int seen = 0, stray = 0;
+  for (int v = window.rows.begin + step / 2; v < window.rows.end; v += step)
+    for (int u = window.columns.begin + step / 2; u < window.columns.end; u += step) {
+      const float depth = grid->row(v)[u];
+      if (std::isnan(depth))
+        continue;
+      const Eigen::Vector3d ray((u - camera.cx) / camera.fx,
+                                (v - camera.cy) / camera.fy,
+                                1.0);
+      const auto on_patch = intersectRay(patch, pose.c, pose.R * ray);
+      if (!on_patch)
+        continue;
+      ++seen;
+      stray += std::abs(1.0 / depth - 1.0 / *on_patch) > kSigmas * sigma ? 1 : 0;
+    }
+  return seen > 0 ? static_cast<double>(stray) / seen : 0.0;
+}
+
+double
+NeighborhoodSampler::strayShare(int seed, const Patch& patch) const
+{
+  return impl_->grid && impl_->isValid(seed) ? impl_->strayShare(seed, patch) : 0.0;
 }
 
 void

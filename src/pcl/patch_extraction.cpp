@@ -102,6 +102,12 @@ public:
     return patch;
   }
 
+  /// ValidationOptions::max_stray
+  std::optional<double> largestStray() const
+  {
+    return validation_ ? validation_->max_stray : std::nullopt;
+  }
+
 private:
   /// Makes the normal at a place show to the side that is wanted.
   void turnNormals(const Eigen::Vector3d& place, PointBatch& batch) const
@@ -131,6 +137,8 @@ struct CompleteSites {
   std::vector<Seed> seeds;
   NeighborhoodSearch search;
   NeighborhoodSearch second_search; ///< may be none
+  /// NeighborhoodSampler::strayShare(); none where the searches are the caller's
+  std::function<double(const Seed&, const Patch&)> stray_share;
   double radius_m = 0.0; ///< of the neighbourhoods; 0: they have none
   bool promising = true; ///< else it has been said what is wrong
 };
@@ -174,6 +182,10 @@ completeSites(const PatchSites& asked,
   if (options.sampler.neighborhood == Neighborhood::Patch)
     sites.second_search =
         searchOf(sampler, threads, &NeighborhoodSampler::strictNeighborhood);
+  if (sampler->usesPixels())
+    sites.stray_share = [sampler](const Seed& seed, const Patch& patch) {
+      return sampler->strayShare(seed.index, patch);
+    };
   if (const std::string notice = fallbackNotice(*sampler, chosen.cloud);
       !notice.empty())
     notices.push_back(notice);
@@ -222,6 +234,21 @@ private:
   std::atomic<bool> over_{false};
 };
 
+/// The check that needs the pixels around the patch.
+void
+checkStray(const Seed& seed,
+           const CompleteSites& sites,
+           std::optional<double> limit,
+           ExtractedPatch& patch)
+{
+  if (!sites.stray_share || !limit || !isAccepted(patch))
+    return;
+  Validation& validation = *patch.validation;
+  validation.stray_share = sites.stray_share(seed, patch.fit.patch);
+  if (validation.stray_share > *limit)
+    validation.verdict = PatchVerdict::OverEdge;
+}
+
 /// True when another part of the neighbourhood may be what was asked for.
 bool
 deservesSecondAttempt(const ExtractedPatch& patch)
@@ -244,17 +271,18 @@ attemptAt(const Seed& seed,
           const PatchMaker& maker,
           Workspace& work)
 {
-  sites.search(seed, thread, work.indices);
-  ExtractedPatch patch =
-      maker.make(work.indices, seed.position, sites.radius_m, work.batch);
+  const auto attempt = [&](const NeighborhoodSearch& search) {
+    search(seed, thread, work.indices);
+    ExtractedPatch patch =
+        maker.make(work.indices, seed.position, sites.radius_m, work.batch);
+    checkStray(seed, sites, maker.largestStray(), patch);
+    return patch;
+  };
+  ExtractedPatch patch = attempt(sites.search);
   if (sites.second_search && deservesSecondAttempt(patch)) {
-    const std::size_t size = work.indices.size();
     std::vector<int> first = work.indices;
-    sites.second_search(seed, thread, work.indices);
-    ExtractedPatch second;
-    if (work.indices.size() < size)
-      second = maker.make(work.indices, seed.position, sites.radius_m, work.batch);
-    if (work.indices.size() < size && isAccepted(second)) {
+    ExtractedPatch second = attempt(sites.second_search);
+    if (isAccepted(second)) {
       patch = std::move(second);
       patch.is_second_attempt = true;
     }

@@ -115,6 +115,7 @@ ValidationOptions::withoutLimits()
                            &ValidationOptions::max_sagitta,
                            &ValidationOptions::max_bend,
                            &ValidationOptions::max_departure,
+                           &ValidationOptions::max_stray,
                            &ValidationOptions::max_view_angle_rad,
                            &ValidationOptions::min_coverage,
                            &ValidationOptions::max_chi2_per_dof})
@@ -131,6 +132,7 @@ validityError(const ValidationOptions& options)
       {&ValidationOptions::max_sagitta, "max_sagitta"},
       {&ValidationOptions::max_bend, "max_bend"},
       {&ValidationOptions::max_departure, "max_departure"},
+      {&ValidationOptions::max_stray, "max_stray"},
       {&ValidationOptions::max_view_angle_rad, "max_view_angle_rad"},
       {&ValidationOptions::max_curvature_per_m, "max_curvature_per_m"},
       {&ValidationOptions::max_residual_m, "max_residual_m"},

@@ -32,6 +32,11 @@ struct ValidationOptions {
   /// obstacle or another surface. (Where the noise itself reaches that far, at 3 m and
   /// 5 cm for a Kinect, the radius is too small for the sensor.)
   std::optional<double> max_departure = 1.0 / 3.0;
+  /// Largest share of the pixels that see the bounded patch and measured a point
+  /// elsewhere (NeighborhoodSampler::strayShare()): bounds follow from moments and
+  /// reach beyond the points, perhaps over an edge. Asked where patches are extracted
+  /// from organized clouds.
+  std::optional<double> max_stray = 0.02;
   /// Largest angle between the normal and the ray from the sensor, rad: 85 degrees. A
   /// surface at a graze fills a pixel with a dozen of its widths; what normal comes out
   /// is that of an edge or of the noise. Not asked where the viewpoint is unknown.
@@ -64,7 +69,7 @@ struct ValidationOptions {
 std::string validityError(const ValidationOptions& options);
 
 /// Outcome of the checks; the first that fails counts: extent, sagitta, curvature,
-/// view, residual, departure, coverage, chi-square.
+/// view, residual, departure, coverage, chi-square, edge.
 enum class PatchVerdict : std::uint8_t {
   Accepted,
   NotUsable, ///< the fit has no usable patch, or there is no finite point
@@ -75,7 +80,8 @@ enum class PatchVerdict : std::uint8_t {
   ExtentTooLarge,
   SagittaTooLarge,
   DepartureTooLarge, ///< a single point
-  NormalNotSeen ///< the surface is at a graze
+  NormalNotSeen, ///< the surface is at a graze
+  OverEdge ///< pixels that see the patch measured points elsewhere
 };
 
 /// "accepted", "curvature_too_large", ... as in the program's JSON.
@@ -93,6 +99,7 @@ struct Validation {
   /// the stronger curvature over the longer bound.
   double sagitta_m = 0.0;
   double view_angle_rad = 0.0; ///< zero where the viewpoint is unknown
+  double stray_share = 0.0; ///< zero where it was not asked for
   SurfaceResidual residual;
   Coverage coverage;
   double chi2_per_dof = 0.0; ///< zero without degrees of freedom

@@ -6,7 +6,7 @@
 
 namespace holdfast {
 
-inline constexpr EnumNames<PatchVerdict, 10> kVerdictNames{{"accepted",
+inline constexpr EnumNames<PatchVerdict, 11> kVerdictNames{{"accepted",
                                                             "not_usable",
                                                             "curvature_too_large",
                                                             "residual_too_large",
@@ -15,6 +15,7 @@ inline constexpr EnumNames<PatchVerdict, 10> kVerdictNames{{"accepted",
                                                             "extent_too_large",
                                                             "sagitta_too_large",
                                                             "departure_too_large",
-                                                            "normal_not_seen"}};
+                                                            "normal_not_seen",
+                                                            "over_edge"}};
 
 } // namespace holdfast
