@@ -30,12 +30,12 @@ run departures consistency --trials 5000 --seed 7 --scene robot-1.0 \
   without-smooth-circle
 # Views nobody chose; every patch of whole clouds; and errors that neighbouring pixels share.
 run sweep consistency --trials 3000 --seed 7 --scene sweep
-run clouds consistency --trials 1000 --seed 7 --scene rocks table stairs mix
+run clouds consistency --trials 300 --seed 7 --scene rocks table stairs mix
 run pattern consistency --trials 1000 --seed 7 --scene sweep-1.0 --sensor xtion
 # The paper's table and figures, and two questions it leaves open.
 run . table1 --trials 10000 --seed 7
 run . figure5 --trials 5000 --seed 7
-run . neighborhoods --trials 500 --seed 7
+run . neighborhoods --trials 200 --seed 7
 if [[ -n $recordings ]]; then
   ln -s "$recordings" recordings
   run . figure6 --data recordings
