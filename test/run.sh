@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs what is missing, builds everything and runs every test; then what else must
-# hold: the quick start works, the tests of bad data and misuse pass under sanitizers,
-# and clang is content.
+# hold: the quick start works, and the tests of bad data and misuse pass under
+# sanitizers. test/clang.sh does the same by clang, with the core alone.
 #
 #   test/run.sh [ctest options]     e.g. test/run.sh -R rotation: these tests alone
 #
@@ -31,7 +31,4 @@ leg "the quick start, without OpenNI2 and viewer"
 
 leg "sanitizers, without Highway"
 "$root/test/sanitize.sh"
-
-leg "clang: the core alone, without PCL; the syntax of the rest"
-"$root/test/clang.sh"
 leg "done"
