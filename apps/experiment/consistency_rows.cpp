@@ -148,9 +148,7 @@ describePatches(int trials, bool shared_errors, Report& report)
                          {"sigma max", "sigma_ratio_max"},
                          {"bias", "bias_after_shift_max"},
                          {"type errors", "type_error_rate"},
-                         {"failures", "failure_rate"},
-                         {"over an edge", "over_edge"},
-                         {"covered", "covered"}});
+                         {"failures", "failure_rate"}});
   report.remarks.push_back(
       "NEES/dof: squared error about the noise-free fit, normalised by the predicted "
       "covariance; 1 is right, and a Monte Carlo of this size gives it to about +-" +
@@ -191,7 +189,9 @@ describeClouds(Report& report)
                          {"switched", "switch_rate"},
                          {"other type", "other_type"},
                          {"no reference", "no_reference"},
-                         {"failures", "failure_rate"}});
+                         {"failures", "failure_rate"},
+                         {"over an edge", "over_edge"},
+                         {"covered", "covered"}});
   report.remarks.push_back(
       "Whole clouds: every accepted patch about the fit to the same pixels without "
       "noise, under the same covariances. far: those more than ten sigmas off, at "

@@ -135,16 +135,9 @@ public:
 private:
   FitResult fitted(bool truth, const FitOptions& options)
   {
-    const auto at = [&](std::size_t i) {
-      return image_.truth[static_cast<std::size_t>(indices_[i])];
-    };
     gatherer_.gather(indices_, {0.0, 0.0, kDistance}, batch_);
-    for (std::size_t i = 0; truth && i < indices_.size(); ++i) {
-      const Eigen::Vector3d q = at(i) - batch_.origin();
-      batch_.channel(PointBatch::X)[i] = q.x();
-      batch_.channel(PointBatch::Y)[i] = q.y();
-      batch_.channel(PointBatch::Z)[i] = q.z();
-    }
+    if (truth)
+      takeTruth(image_, indices_, batch_);
     return estimatePatch(batch_, options);
   }
 

@@ -34,19 +34,47 @@ noiseFreeBatch(const Scene& scene, const RayGrid& rays, const NoiseModel& noise)
   return batch;
 }
 
+namespace {
+
 RangeCloud
-cloudOf(const RangeImage& image)
+cloudWith(const std::vector<Eigen::Vector3d>& positions, const RangeImage& image)
 {
   auto points = std::make_shared<pcl::PointCloud<pcl::PointXYZ>>(
       static_cast<std::uint32_t>(image.width),
       static_cast<std::uint32_t>(image.height));
   points->is_dense = false;
   for (std::size_t i = 0; i < points->size(); ++i)
-    (*points)[i].getVector3fMap() = image.points[i].cast<float>();
+    (*points)[i].getVector3fMap() = positions[i].cast<float>();
   RangeCloud cloud;
   cloud.points = points;
   cloud.sensor_pose = image.sensor_pose;
   return cloud;
+}
+
+} // namespace
+
+RangeCloud
+cloudOf(const RangeImage& image)
+{
+  return cloudWith(image.points, image);
+}
+
+RangeCloud
+trueCloudOf(const RangeImage& image)
+{
+  return cloudWith(image.truth, image);
+}
+
+void
+takeTruth(const RangeImage& image, const std::vector<int>& indices, PointBatch& batch)
+{
+  for (std::size_t i = 0; i < indices.size(); ++i) {
+    const Eigen::Vector3d q =
+        image.truth[static_cast<std::size_t>(indices[i])] - batch.origin();
+    batch.channel(PointBatch::X)[i] = q.x();
+    batch.channel(PointBatch::Y)[i] = q.y();
+    batch.channel(PointBatch::Z)[i] = q.z();
+  }
 }
 
 void

@@ -28,6 +28,15 @@ PointBatch noiseFreeBatch(const Scene& scene,
 /// The measured points as an organized cloud.
 RangeCloud cloudOf(const RangeImage& image);
 
+/// The true points likewise.
+RangeCloud trueCloudOf(const RangeImage& image);
+
+/// Puts the true points in the place of those that were gathered, whose covariances
+/// stay.
+void takeTruth(const RangeImage& image,
+               const std::vector<int>& indices,
+               PointBatch& batch);
+
 /// One of the paper's metrics, to loop over.
 struct Metric {
   const char* name; ///< "Phi_d"

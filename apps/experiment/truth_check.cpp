@@ -1,5 +1,7 @@
 #include "truth_check.h"
 
+#include "scene.h"
+
 #include <holdfast/geometry/constants.h>
 #include <holdfast/patch/surface.h>
 #include <holdfast/patch_estimator.h>
@@ -17,23 +19,6 @@ namespace holdfast::app {
 namespace {
 
 constexpr double kSigmas = 4.0;
-
-/// The points without noise as a cloud of that camera.
-RangeCloud
-trueCloud(const RangeImage& image)
-{
-  auto points = pcl::make_shared<pcl::PointCloud<pcl::PointXYZ>>(
-      static_cast<std::uint32_t>(image.width),
-      static_cast<std::uint32_t>(image.height));
-  for (std::size_t i = 0; i < image.truth.size(); ++i)
-    (*points)[i].getVector3fMap() = image.truth[i].cast<float>();
-  points->is_dense = false;
-  RangeCloud cloud;
-  cloud.points = points;
-  cloud.sensor_pose = image.sensor_pose;
-  cloud.sensor_pose_given = true;
-  return cloud;
-}
 
 /// True where the measured point that the pixel might show lies on the patch, too.
 bool
@@ -94,7 +79,7 @@ class SmoothSurface {
 public:
   SmoothSurface(const RangeImage& image, const Sensor& sensor, double radius_m)
   : camera_(sensor.camera)
-  , cloud_(trueCloud(image))
+  , cloud_(trueCloudOf(image))
   , sampler_(cloud_, sensor, optionsFor(radius_m))
   , scratch_(sampler_.makeScratch())
   , gatherer_(cloud_, sensor, true)

@@ -3,6 +3,7 @@
 #include "consistency_rows.h"
 #include "scene.h"
 
+#include <holdfast/geometry/constants.h>
 #include <holdfast/geometry/rotation.h>
 #include <holdfast/pcl/neighborhood_sampler.h>
 #include <holdfast/pcl/patch_extraction.h>
@@ -25,7 +26,6 @@ namespace {
 Scene
 viewOf(const std::string& name, std::mt19937_64& generator)
 {
-  constexpr double kPi = 3.141592653589793;
   const auto uniform = [&](double low, double high) {
     return low + (high - low) * std::generate_canonical<double, 53>(generator);
   };
@@ -64,13 +64,7 @@ public:
     else
       sampler_.neighborhood(patch.seed_index.value(), *scratch_, indices_);
     gatherer_.gather(indices_, patch.seed, batch_);
-    for (std::size_t i = 0; i < indices_.size(); ++i) {
-      const Eigen::Vector3d q =
-          image_.truth[static_cast<std::size_t>(indices_[i])] - batch_.origin();
-      batch_.channel(PointBatch::X)[i] = q.x();
-      batch_.channel(PointBatch::Y)[i] = q.y();
-      batch_.channel(PointBatch::Z)[i] = q.z();
-    }
+    takeTruth(image_, indices_, batch_);
     return estimator_.estimate(batch_);
   }
 

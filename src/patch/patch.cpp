@@ -1,3 +1,4 @@
+#include "patch/canonical_axis.h"
 #include <holdfast/geometry/constants.h>
 #include <holdfast/geometry/rotation.h>
 #include <holdfast/patch/patch.h>
@@ -10,23 +11,10 @@
 namespace holdfast {
 namespace {
 
-// A component of the x axis smaller than this is rounding and does not decide its sign.
-constexpr double kZeroComponent = 1e-12;
-
 bool
 hasTwoCurvatures(SurfaceType surface)
 {
   return curvatureParameterCount(surface) == 2;
-}
-
-// True when the first of x, y, z that is not zero within rounding is negative.
-bool
-pointsBackwards(const Eigen::Vector3d& axis)
-{
-  for (const double component : axis)
-    if (std::abs(component) >= kZeroComponent)
-      return component < 0.0;
-  return false;
 }
 
 std::string

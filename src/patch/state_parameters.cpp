@@ -2,6 +2,8 @@
 
 #include "geometry/safe_gap.h"
 #include "geometry/symmetric.h"
+#include "patch/canonical_axis.h"
+#include <holdfast/geometry/constants.h>
 #include <holdfast/geometry/rotation.h>
 
 #include <Eigen/Geometry>
@@ -15,8 +17,6 @@
 namespace holdfast {
 namespace {
 
-constexpr double kHalfTurn = 3.14159265358979323846;
-
 // Derivative with respect to the state's coordinates.
 using Row = Eigen::Matrix<double, 1, Eigen::Dynamic, Eigen::RowMajor, 1, kMaxState>;
 using Rows3 = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, kMaxState>;
@@ -25,17 +25,6 @@ double
 angleOfLarger(const Eigen::Vector3d& m)
 {
   return 0.5 * std::atan2(2.0 * m[1], m[0] - m[2]);
-}
-
-// True when the first component that is not zero within rounding is negative.
-bool
-pointsBackwards(const Eigen::Vector3d& x)
-{
-  constexpr double kZero = 1e-12;
-  for (const double component : x)
-    if (std::abs(component) > kZero)
-      return component < 0.0;
-  return false;
 }
 
 StateAxes
@@ -204,11 +193,11 @@ axesOf(const PatchState& state)
   double angle = angleOfLarger(flat ? state.moments : state.curvature);
   // The algebraically larger curvature is the stronger one where the mean is positive.
   if (!flat && state.curvature[0] + state.curvature[2] > 0.0)
-    angle += 0.5 * kHalfTurn;
+    angle += 0.5 * kPi;
   StateAxes axes = turnedBy(state, angle);
   if (std::abs(axes.curvature[0]) > std::abs(axes.curvature[2])) // opposite but equal
-    axes = turnedBy(state, angle += 0.5 * kHalfTurn);
-  return pointsBackwards(axes.R.col(0)) ? turnedBy(state, angle + kHalfTurn) : axes;
+    axes = turnedBy(state, angle += 0.5 * kPi);
+  return pointsBackwards(axes.R.col(0)) ? turnedBy(state, angle + kPi) : axes;
 }
 
 PatchState

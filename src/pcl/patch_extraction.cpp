@@ -271,17 +271,21 @@ attemptAt(const Seed& seed,
           const PatchMaker& maker,
           Workspace& work)
 {
-  const auto attempt = [&](const NeighborhoodSearch& search) {
-    search(seed, thread, work.indices);
+  const auto fitted = [&] {
     ExtractedPatch patch =
         maker.make(work.indices, seed.position, sites.radius_m, work.batch);
     checkStray(seed, sites, maker.largestStray(), patch);
     return patch;
   };
-  ExtractedPatch patch = attempt(sites.search);
+  sites.search(seed, thread, work.indices);
+  ExtractedPatch patch = fitted();
   if (sites.second_search && deservesSecondAttempt(patch)) {
     std::vector<int> first = work.indices;
-    ExtractedPatch second = attempt(sites.second_search);
+    sites.second_search(seed, thread, work.indices);
+    // The same points would give the same patch.
+    ExtractedPatch second;
+    if (work.indices != first)
+      second = fitted();
     if (isAccepted(second)) {
       patch = std::move(second);
       patch.is_second_attempt = true;
