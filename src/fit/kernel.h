@@ -23,6 +23,8 @@
 /// that is, through ten sums. The gradient is L[f_a].
 #pragma once
 
+#include "patch/boundary_form.h"
+
 #include <holdfast/fit/options.h>
 
 #include <cstdint>
@@ -142,6 +144,23 @@ namespace reference {
 int countLeadingValid(const Points& points);
 } // namespace reference
 
+/// A bounded patch, coordinates relative to the batch's origin.
+struct PatchForm {
+  double R[9]; ///< row-major, local to world
+  double c[3];
+  double k[3]; ///< diagonal of K (patch/surface.h)
+  BoundaryForm boundary;
+};
+
+/// Of every point, padding included: its local coordinates, how far out they are
+/// (BoundaryForm), and its squared distance to the unbounded surface along the gradient
+/// at the point (validation/residual.h).
+struct PlacedPoints {
+  double* q[3];
+  double* reach;
+  double* squared_distance;
+};
+
 /// A square grid of cells, row by row, with kCellRow numbers each.
 inline constexpr int kCells = 8; ///< along a side; even
 inline constexpr int kCellRow = 16; ///< a multiple of every vector
@@ -197,6 +216,11 @@ struct Kernel {
                            const Points& points,
                            const State& state,
                            double* out);
+
+  /// Where points lie about a patch; of the points only the coordinates are used.
+  void (*placePoints)(const Points& points,
+                      const PatchForm& patch,
+                      const PlacedPoints& out);
 
   /// sum_bb' y_b C(b - b') y_b'^T over the cells of a grid, whose covariance depends on
   /// their distance in rows and columns alone.

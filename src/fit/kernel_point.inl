@@ -967,6 +967,58 @@ residualsOfPoints(const Points& points, const State& state, double* out)
   }
 }
 
+HOLDFAST_INLINE Number
+larger(Number a, Number b)
+{
+  return selectLess(a, b, b, a);
+}
+
+HOLDFAST_INLINE Number
+reachOf(const BoundaryForm& boundary, Number x, Number y)
+{
+  if (boundary.is_ellipse) {
+    const Number u = x * boundary.ax[0], v = y * boundary.ay[0];
+    return u * u + v * v;
+  }
+  Number side[4];
+  HOLDFAST_UNROLLED_FOR (int s = 0; s < 4; ++s)
+    side[s] = x * boundary.ax[s] + y * boundary.ay[s];
+  return larger(larger(side[0], side[1]), larger(side[2], side[3]));
+}
+
+// Square of the smaller root t of f(q - t h) = f - 2 t h^2 + t^2 h^T K h, h half the
+// gradient, times h^2; of the extremum where there is no root.
+HOLDFAST_INLINE Number
+squaredDistance(const double k[3], const Number q[3])
+{
+  Number h[3], Kh[3];
+  HOLDFAST_UNROLLED_FOR (int i = 0; i < 3; ++i)
+    h[i] = q[i] * k[i];
+  const Number f = dot(q, h) - q[2] * 2.0;
+  h[2] = h[2] - 1.0;
+  HOLDFAST_UNROLLED_FOR (int i = 0; i < 3; ++i)
+    Kh[i] = h[i] * k[i];
+  const Number hh = dot(h, h);
+  const Number squared = larger(hh * hh - f * dot(h, Kh), Number(0.0));
+  const Number t = f / (hh + squareRoot(squared));
+  return t * t * hh;
+}
+
+inline void
+placePoints(const Points& points, const PatchForm& patch, const PlacedPoints& out)
+{
+  for (int i = 0; i < points.padded_size; i += kLanes) {
+    Number offset[3], q[3];
+    HOLDFAST_UNROLLED_FOR (int k = 0; k < 3; ++k)
+      offset[k] = load(points.channel[k] + i) - patch.c[k];
+    rotateIntoFrame(patch.R, offset, q);
+    HOLDFAST_UNROLLED_FOR (int k = 0; k < 3; ++k)
+      store(q[k], out.q[k] + i);
+    store(reachOf(patch.boundary, q[0], q[1]), out.reach + i);
+    store(squaredDistance(patch.k, q), out.squared_distance + i);
+  }
+}
+
 // ---- Choice of surface and residual -----------------------------------------------
 
 // Calls action.run<Surface, ResidualPolicy>() for the surface and residual named.
@@ -1171,5 +1223,6 @@ makeKernel(const char* instruction_set)
           accumulateNormal,
           accumulateCovariance,
           squaredResiduals,
+          placePoints,
           sumOverCells};
 }

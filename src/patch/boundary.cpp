@@ -1,15 +1,14 @@
 #include <holdfast/geometry/constants.h>
 #include <holdfast/patch/boundary.h>
 
+#include "boundary_form.h"
+
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
 namespace holdfast {
 namespace {
-
-// A point on the boundary may lie outside by rounding; relative to the patch's size.
-constexpr double kOnBoundary = 1e-12;
 
 constexpr double kMostSegments = 1e6;
 
@@ -53,20 +52,6 @@ cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b)
   return a.x() * b.y() - a.y() * b.x();
 }
 
-bool
-quadContains(const Patch& patch, const Eigen::Vector2d& point)
-{
-  const auto corner = corners(patch);
-  for (std::size_t s = 0; s < 4; ++s) {
-    const Eigen::Vector2d side = corner[(s + 1) % 4] - corner[s];
-    // The centre is at this distance, times |side|, on the inner side of the edge.
-    const double inside = cross(corner[s], side);
-    if (!(cross(side, point - corner[s]) >= -kOnBoundary * inside))
-      return false;
-  }
-  return true;
-}
-
 int
 segmentCount(double length, double spacing)
 {
@@ -80,20 +65,29 @@ segmentCount(double length, double spacing)
 
 } // namespace
 
+BoundaryForm::BoundaryForm(const Patch& patch)
+: is_ellipse(!hasCorners(patch.type.boundary)), ax{}, ay{}
+{
+  if (is_ellipse) {
+    const Eigen::Vector2d axes = halfAxes(patch);
+    ax[0] = 1.0 / axes.x();
+    ay[0] = 1.0 / axes.y();
+    return;
+  }
+  const auto corner = corners(patch);
+  for (std::size_t s = 0; s < 4; ++s) {
+    const Eigen::Vector2d side = corner[(s + 1) % 4] - corner[s];
+    // The centre is at this distance, times |side|, on the inner side of the edge.
+    const double inside = cross(corner[s], side);
+    ax[s] = side.y() / inside;
+    ay[s] = -side.x() / inside;
+  }
+}
+
 bool
 contains(const Patch& patch, const Eigen::Vector2d& local_xy)
 {
-  const Eigen::Vector2d axes = halfAxes(patch);
-  switch (patch.type.boundary) {
-  case BoundaryType::Rectangle:
-    return (local_xy.cwiseAbs().array() <= (1.0 + kOnBoundary) * axes.array()).all();
-  case BoundaryType::Quad:
-    return quadContains(patch, local_xy);
-  case BoundaryType::Ellipse:
-  case BoundaryType::Circle:
-    break;
-  }
-  return local_xy.cwiseQuotient(axes).squaredNorm() <= 1.0 + kOnBoundary; // eq. (2)
+  return BoundaryForm(patch).contains(local_xy.x(), local_xy.y());
 }
 
 double

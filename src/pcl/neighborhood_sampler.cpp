@@ -7,7 +7,7 @@
 #include "seeds.h"
 #include "surface_patch.h"
 
-#include <holdfast/patch/surface.h>
+#include "patch/patch_rays.h"
 
 #include <pcl/common/point_tests.h>
 #include <pcl/kdtree/kdtree_flann.h>
@@ -567,6 +567,7 @@ NeighborhoodSampler::Impl::strayShare(int seed, const Patch& patch) const
   const int step = std::max(1, static_cast<int>(std::sqrt(pixels / kPixels)));
   const double z = inCamera(seed).z();
   const double sigma = depthSigma(seed) / (z * z); // of 1/z
+  const PatchRays rays(patch, pose.c);
   int seen = 0, stray = 0;
   for (int v = window.rows.begin + step / 2; v < window.rows.end; v += step)
     for (int u = window.columns.begin + step / 2; u < window.columns.end; u += step) {
@@ -576,7 +577,7 @@ NeighborhoodSampler::Impl::strayShare(int seed, const Patch& patch) const
       const Eigen::Vector3d ray((u - camera.cx) / camera.fx,
                                 (v - camera.cy) / camera.fy,
                                 1.0);
-      const auto on_patch = intersectRay(patch, pose.c, pose.R * ray);
+      const auto on_patch = rays.meet(pose.R * ray);
       if (!on_patch)
         continue;
       ++seen;

@@ -1,6 +1,8 @@
 #include <holdfast/validation/checks.h>
 #include <holdfast/validation/names.h>
 
+#include "local_points.h"
+
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -98,8 +100,9 @@ check(const FitResult& fit,
   validation.sagitta_m = sagittaOf(fit.patch);
   if (options.max_view_angle_rad)
     validation.view_angle_rad = viewAngle(fit.patch, points);
-  validation.residual = measureResidual(fit.patch, points);
-  validation.coverage = measureCoverage(fit.patch, points, options.coverage);
+  const LocalPoints placed(fit.patch, points);
+  validation.residual = residualOf(fit.patch, placed);
+  validation.coverage = coverageOf(fit.patch, placed, options.coverage);
   validation.chi2_per_dof = chi2PerDof(fit);
   validation.verdict = judge(validation, options, radius_m);
   return validation;

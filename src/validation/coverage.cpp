@@ -28,28 +28,31 @@ boundingBox(const Patch& patch)
 class CellGrid {
 public:
   CellGrid(const Patch& patch, const Eigen::AlignedBox2d& box, double wanted_cells)
-  : patch_(patch), box_(box)
+  : boundary_(patch), box_(box)
   {
     const Eigen::Vector2d size = box.sizes();
     columns_ = lineCount(wanted_cells, size.x() / size.y());
     rows_ = lineCount(wanted_cells, size.y() / size.x());
     cell_size_ = size.cwiseQuotient(Eigen::Vector2d(columns_, rows_));
+    cells_per_m_ = cell_size_.cwiseInverse();
     samples_per_side_ = std::max(4, 16 / std::max(columns_, rows_));
     for (int row = 0; row < rows_; ++row)
       for (int column = 0; column < columns_; ++column)
         at(column, row) = {samplesWithin(column, row), 0, 0};
   }
 
-  void add(const Eigen::Vector2d& point)
+  void add(double x, double y, bool inside)
   {
-    const bool inside = contains(patch_, point);
     ++(inside ? points_inside_ : points_outside_);
-    if (!inside && !box_.contains(point))
+    const double column = (x - box_.min().x()) * cells_per_m_.x();
+    const double row = (y - box_.min().y()) * cells_per_m_.y();
+    const bool in_box =
+        column >= 0.0 && row >= 0.0 && column <= columns_ && row <= rows_;
+    if (!inside && !in_box)
       return;
     // The upper edge of the box, and what is beyond by rounding, are in the last cell.
-    const Eigen::Vector2d cells = (point - box_.min()).cwiseQuotient(cell_size_);
-    Cell& cell = at(std::clamp(static_cast<int>(cells.x()), 0, columns_ - 1),
-                    std::clamp(static_cast<int>(cells.y()), 0, rows_ - 1));
+    Cell& cell = at(std::clamp(static_cast<int>(column), 0, columns_ - 1),
+                    std::clamp(static_cast<int>(row), 0, rows_ - 1));
     ++(inside ? cell.inside : cell.outside);
   }
 
@@ -119,8 +122,9 @@ private:
   {
     const int n = samples_per_side_;
     const auto isWithin = [&](int i, int j) {
-      const Eigen::Vector2d cells(column + (i + 0.5) / n, row + (j + 0.5) / n);
-      return contains(patch_, box_.min() + cells.cwiseProduct(cell_size_));
+      const double x = box_.min().x() + (column + (i + 0.5) / n) * cell_size_.x();
+      const double y = box_.min().y() + (row + (j + 0.5) / n) * cell_size_.y();
+      return boundary_.contains(x, y);
     };
     // Boundaries are convex: when the corners are within, so is all between.
     const int last = n - 1;
@@ -147,9 +151,9 @@ private:
     return points_inside_ / cellShare(std::max(samples, 1));
   }
 
-  const Patch& patch_;
+  BoundaryForm boundary_;
   Eigen::AlignedBox2d box_;
-  Eigen::Vector2d cell_size_;
+  Eigen::Vector2d cell_size_, cells_per_m_;
   int columns_, rows_;
   int samples_per_side_;
   int points_inside_ = 0, points_outside_ = 0;
@@ -157,33 +161,19 @@ private:
   std::array<Cell, kMostLines * kMostLines> cells_;
 };
 
-template <typename Points>
 double
-wantedCells(const Pose& pose,
-            const Eigen::AlignedBox2d& box,
-            const Points& points,
+wantedCells(const Eigen::AlignedBox2d& box,
+            const LocalPoints& points,
             const CoverageOptions& options)
 {
   if (options.cell_size_m)
     return (box.sizes() / *options.cell_size_m).prod();
   int in_box = 0;
-  forEachLocal(pose, points, [&](const Eigen::Vector3d& q) {
-    in_box += box.contains(q.head<2>());
-  });
+  const double *x = points.x(), *y = points.y();
+  for (int i = 0; i < points.size(); ++i)
+    in_box += (x[i] >= box.min().x()) & (x[i] <= box.max().x()) &
+              (y[i] >= box.min().y()) & (y[i] <= box.max().y());
   return in_box / options.points_per_cell;
-}
-
-template <typename Points>
-Coverage
-measure(const Patch& patch, const Points& points, const CoverageOptions& options)
-{
-  if (const std::string error = validityError(options); !error.empty())
-    throw std::invalid_argument(error);
-  const Pose pose = patch.pose();
-  const Eigen::AlignedBox2d box = boundingBox(patch);
-  CellGrid grid(patch, box, wantedCells(pose, box, points, options));
-  forEachLocal(pose, points, [&](const Eigen::Vector3d& q) { grid.add(q.head<2>()); });
-  return grid.evaluate(options);
 }
 
 } // namespace
@@ -204,11 +194,25 @@ validityError(const CoverageOptions& options)
 }
 
 Coverage
+coverageOf(const Patch& patch,
+           const LocalPoints& points,
+           const CoverageOptions& options)
+{
+  if (const std::string error = validityError(options); !error.empty())
+    throw std::invalid_argument(error);
+  const Eigen::AlignedBox2d box = boundingBox(patch);
+  CellGrid grid(patch, box, wantedCells(box, points, options));
+  for (int i = 0; i < points.size(); ++i)
+    grid.add(points.x()[i], points.y()[i], points.isInside(i));
+  return grid.evaluate(options);
+}
+
+Coverage
 measureCoverage(const Patch& patch,
                 const PointBatch& points,
                 const CoverageOptions& options)
 {
-  return measure(patch, points, options);
+  return coverageOf(patch, LocalPoints(patch, points), options);
 }
 
 Coverage
@@ -216,7 +220,7 @@ measureCoverage(const Patch& patch,
                 const std::vector<Eigen::Vector3d>& points,
                 const CoverageOptions& options)
 {
-  return measure(patch, points, options);
+  return coverageOf(patch, LocalPoints(patch, points), options);
 }
 
 } // namespace holdfast

@@ -1,44 +1,72 @@
-/// \file The points of a neighbourhood in the local frame of a patch.
+/// \file The points of a neighbourhood as its patch sees them.
 #pragma once
 
+#include "fit/kernel.h"
+#include "patch/boundary_form.h"
 #include <holdfast/fit/point_batch.h>
-#include <holdfast/geometry/pose.h>
+#include <holdfast/patch/patch.h>
+#include <holdfast/validation/coverage.h>
+#include <holdfast/validation/residual.h>
 
 #include <vector>
 
 namespace holdfast {
 
-/// Calls visit(local) for every finite point.
-template <typename Visit>
-void
-forEachLocal(const Pose& pose, const PointBatch& points, Visit&& visit)
-{
-  // A sum of columns compiles to a third of the time of Pose::toLocal(). The origins
-  // are subtracted first, so that patches far from zero lose no precision.
-  const Eigen::Matrix3d axes = pose.R.transpose();
-  const Eigen::Vector3d shift = axes * (points.origin() - pose.c);
-  const double* x = points.channel(PointBatch::X);
-  const double* y = points.channel(PointBatch::Y);
-  const double* z = points.channel(PointBatch::Z);
-  for (int i = 0; i < points.size(); ++i) {
-    const Eigen::Vector3d local =
-        axes.col(0) * x[i] + axes.col(1) * y[i] + axes.col(2) * z[i] + shift;
-    if (local.allFinite())
-      visit(local);
-  }
-}
+/// The finite ones among the points, placed about a patch in one pass. Uses working
+/// memory of the thread: one at a time.
+class LocalPoints {
+public:
+  LocalPoints(const Patch& patch, const PointBatch& points);
 
-template <typename Visit>
-void
-forEachLocal(const Pose& pose,
-             const std::vector<Eigen::Vector3d>& points,
-             Visit&& visit)
-{
-  for (const Eigen::Vector3d& point : points) {
-    const Eigen::Vector3d local = pose.toLocal(point);
-    if (local.allFinite())
-      visit(local);
+  /// \param points in world coordinates.
+  LocalPoints(const Patch& patch, const std::vector<Eigen::Vector3d>& points);
+
+  int size() const
+  {
+    return size_;
   }
-}
+
+  Eigen::Vector3d operator[](int i) const
+  {
+    return {placed_.q[0][i], placed_.q[1][i], placed_.q[2][i]};
+  }
+
+  const double* x() const
+  {
+    return placed_.q[0];
+  }
+
+  const double* y() const
+  {
+    return placed_.q[1];
+  }
+
+  bool isInside(int i) const
+  {
+    return placed_.reach[i] <= BoundaryForm::kEdge;
+  }
+
+  /// The approximate one (approximateDistanceToSurface()); perhaps not finite for
+  /// points out of all proportion.
+  double squaredDistance(int i) const
+  {
+    return placed_.squared_distance[i];
+  }
+
+private:
+  void place(const Patch& patch, const PointBatch& points);
+  void leaveOutInvalid();
+
+  int size_ = 0;
+  kernel::PlacedPoints placed_{};
+};
+
+/// measureResidual() and measureCoverage() of points that are placed.
+SurfaceResidual residualOf(const Patch& patch, const LocalPoints& points);
+
+/// \throw std::invalid_argument when the options make no sense.
+Coverage coverageOf(const Patch& patch,
+                    const LocalPoints& points,
+                    const CoverageOptions& options);
 
 } // namespace holdfast

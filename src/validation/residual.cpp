@@ -190,28 +190,6 @@ approximateDistance(const LocalSurface& surface, const Eigen::Vector3d& q)
   return -rootAlongGradient(surface, q) * surface.halfGradient(q).norm();
 }
 
-template <typename Points>
-SurfaceResidual
-measure(const Patch& patch, const Points& points)
-{
-  // The approximation is right to a thousandth below this distance: 0.08^2/8/0.92^2.
-  const LocalSurface surface(patch);
-  const double trusted = 0.08 / surface.k.lpNorm<Eigen::Infinity>();
-  SurfaceResidual residual;
-  double sum = 0.0;
-  forEachLocal(patch.pose(), points, [&](const Eigen::Vector3d& q) {
-    double distance = std::abs(approximateDistance(surface, q));
-    if (!(distance <= trusted))
-      distance = std::abs(exactDistance(surface, q));
-    sum += distance * distance;
-    residual.largest_m = std::max(residual.largest_m, distance);
-    ++residual.points;
-  });
-  if (residual.points > 0)
-    residual.rms_m = std::sqrt(sum / residual.points);
-  return residual;
-}
-
 } // namespace
 
 double
@@ -246,15 +224,41 @@ approximateDistanceToSurface(const Patch& patch, const Eigen::Vector3d& point)
 }
 
 SurfaceResidual
+residualOf(const Patch& patch, const LocalPoints& points)
+{
+  const LocalSurface surface(patch);
+  // The approximation is right to a thousandth below this distance: 0.08^2/8/0.92^2.
+  const double trusted = 0.08 / surface.k.lpNorm<Eigen::Infinity>();
+  const double trusted_square =
+      surface.is_paraboloid ? trusted * trusted : std::numeric_limits<double>::max();
+  SurfaceResidual residual;
+  double sum = 0.0, largest = 0.0;
+  for (int i = 0; i < points.size(); ++i) {
+    double squared = points.squaredDistance(i);
+    if (!(squared <= trusted_square)) {
+      const double exact = exactDistance(surface, points[i]);
+      squared = exact * exact;
+    }
+    sum += squared;
+    largest = std::max(largest, squared);
+  }
+  residual.points = points.size();
+  residual.largest_m = std::sqrt(largest);
+  if (residual.points > 0)
+    residual.rms_m = std::sqrt(sum / residual.points);
+  return residual;
+}
+
+SurfaceResidual
 measureResidual(const Patch& patch, const PointBatch& points)
 {
-  return measure(patch, points);
+  return residualOf(patch, LocalPoints(patch, points));
 }
 
 SurfaceResidual
 measureResidual(const Patch& patch, const std::vector<Eigen::Vector3d>& points)
 {
-  return measure(patch, points);
+  return residualOf(patch, LocalPoints(patch, points));
 }
 
 } // namespace holdfast

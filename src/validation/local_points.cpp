@@ -1,0 +1,91 @@
+#include "local_points.h"
+
+#include <holdfast/patch/surface.h>
+
+#include <cmath>
+#include <cstddef>
+
+namespace holdfast {
+namespace {
+
+using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
+kernel::PatchForm
+formOf(const Patch& patch, const Eigen::Vector3d& origin)
+{
+  kernel::PatchForm form{{}, {}, {}, BoundaryForm(patch)};
+  Eigen::Map<RowMajor>(form.R) = patch.pose().R;
+  // The origins are subtracted first, so that patches far from zero lose no precision.
+  Eigen::Map<Eigen::Vector3d>(form.c) = patch.c - origin;
+  Eigen::Map<Eigen::Vector3d>(form.k) = implicitDiagonal(patch);
+  return form;
+}
+
+kernel::Points
+coordinatesOf(const PointBatch& points)
+{
+  kernel::Points view{};
+  for (int i = 0; i < 3; ++i)
+    view.channel[i] = points.channel(static_cast<PointBatch::Channel>(i));
+  view.padded_size = points.paddedSize();
+  return view;
+}
+
+} // namespace
+
+LocalPoints::LocalPoints(const Patch& patch, const PointBatch& points)
+{
+  place(patch, points);
+}
+
+LocalPoints::LocalPoints(const Patch& patch, const std::vector<Eigen::Vector3d>& points)
+{
+  thread_local PointBatch batch;
+  batch.clear(patch.c);
+  batch.resize(static_cast<int>(points.size()));
+  for (std::size_t i = 0; i < points.size(); ++i)
+    for (int k = 0; k < 3; ++k)
+      batch.channel(static_cast<PointBatch::Channel>(k))[i] = points[i][k] - patch.c[k];
+  batch.pad();
+  place(patch, batch);
+}
+
+void
+LocalPoints::place(const Patch& patch, const PointBatch& points)
+{
+  // Kept between patches: no allocation once they have seen the largest.
+  thread_local std::vector<double> memory;
+  const auto rows = static_cast<std::size_t>(points.paddedSize());
+  if (memory.size() < 5 * rows)
+    memory.resize(5 * rows);
+  double* const row = memory.data();
+  placed_ = {{row, row + rows, row + 2 * rows}, row + 3 * rows, row + 4 * rows};
+  size_ = points.size();
+  kernel::kernel().placePoints(coordinatesOf(points),
+                               formOf(patch, points.origin()),
+                               placed_);
+  leaveOutInvalid();
+}
+
+void
+LocalPoints::leaveOutInvalid()
+{
+  double sum = 0.0;
+  for (int i = 0; i < size_; ++i)
+    sum += placed_.squared_distance[i];
+  if (std::isfinite(sum))
+    return;
+  int kept = 0;
+  for (int i = 0; i < size_; ++i) {
+    if (!(*this)[i].allFinite())
+      continue;
+    for (double* row : placed_.q)
+      row[kept] = row[i];
+    placed_.reach[kept] = placed_.reach[i];
+    placed_.squared_distance[kept] = placed_.squared_distance[i];
+    ++kept;
+  }
+  size_ = kept;
+}
+
+} // namespace holdfast
