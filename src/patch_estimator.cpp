@@ -12,6 +12,25 @@ struct PatchEstimator::Impl {
 
 namespace {
 
+// The stages of a propagation have terms that cancel.
+kernel::Precision
+coarsestFor(CovarianceMode mode)
+{
+  return mode == CovarianceMode::Stagewise ? kernel::Precision::Double :
+                                             kernel::Precision::Single;
+}
+
+// Where d, k and r are at the end of what they can tell, so do those of their
+// covariance.
+bool
+isWorthAllDigits(const PatchFit& fit, const FitResult& result)
+{
+  return fit.surface.precision == kernel::Precision::Single &&
+         fit.status == FitStatus::Converged &&
+         (!isUsable(result.status) || result.flags.curvature_not_observable ||
+          result.flags.orientation_singular);
+}
+
 void
 attach(const PatchFit& fit, const PatchCovariance& uncertainty, FitResult& result)
 {
@@ -32,13 +51,18 @@ attach(const PatchFit& fit, const PatchCovariance& uncertainty, FitResult& resul
 } // namespace
 
 PatchEstimator::PatchEstimator(const FitOptions& options, CovarianceMode mode)
-: impl_(std::make_shared<const Impl>(Impl{PatchFitter(options), mode}))
+: impl_(
+      std::make_shared<const Impl>(Impl{PatchFitter(options, coarsestFor(mode)), mode}))
 {}
 
+namespace {
+
 FitResult
-PatchEstimator::estimate(PointBatch& batch) const
+resultOf(const PatchFit& fit,
+         const PointBatch& batch,
+         const PatchFitter& fitter,
+         CovarianceMode mode)
 {
-  const PatchFit fit = impl_->fitter.fit(batch);
   FitResult result;
   result.status = fit.status;
   result.patch = fit.bounded.patch;
@@ -51,12 +75,22 @@ PatchEstimator::estimate(PointBatch& batch) const
   result.iterations = fit.surface.iterations;
   result.polish_steps = fit.surface.polish_steps;
   result.null_space = fit.null_space;
-  if (fit.status == FitStatus::Converged) {
-    const PatchCovariance uncertainty =
-        patchCovariance(fit, batch, impl_->fitter, impl_->mode);
-    attach(fit, uncertainty, result);
-  }
+  if (fit.status == FitStatus::Converged)
+    attach(fit, patchCovariance(fit, batch, fitter, mode), result);
   return result;
+}
+
+} // namespace
+
+FitResult
+PatchEstimator::estimate(PointBatch& batch) const
+{
+  const auto& [fitter, mode] = *impl_;
+  const PatchFit fit = fitter.fit(batch);
+  const FitResult result = resultOf(fit, batch, fitter, mode);
+  return isWorthAllDigits(fit, result) ?
+             resultOf(fitter.refit(batch, fit), batch, fitter, mode) :
+             result;
 }
 
 FitResult

@@ -41,11 +41,14 @@ refit(const PatchEstimator& estimator,
   return both;
 }
 
+// As many digits as there are.
+constexpr double kTight = 1e-10;
+
 // sum_i G_i Sigma_i G_i^T with G_i by central differences.
 Eigen::MatrixXd
 differencedCovariance(const Sample& sample, FitOptions options)
 {
-  options.polish_tolerance_sigma = 1e-10;
+  options.polish_tolerance_sigma = kTight;
   const PatchEstimator estimator(options);
   Sample moved = sample;
   PointBatch batch = test::batchOf(sample);
@@ -80,6 +83,7 @@ fitted(const Sample& sample,
 void
 expectExact(const Sample& sample, FitOptions options)
 {
+  options.polish_tolerance_sigma = kTight;
   const FitResult result = fitted(sample, options);
   ASSERT_TRUE(isUsable(result.status)) << statusName(result.status);
   const Eigen::MatrixXd differenced = differencedCovariance(sample, options);

@@ -192,13 +192,23 @@ struct Problem {
   NormalSums normalSums() const
   {
     NormalSums sums;
-    kernel().accumulateNormal(model, residual, kernelView(), state(), sums);
+    kernel().accumulateNormal(Precision::Double,
+                              model,
+                              residual,
+                              kernelView(),
+                              state(),
+                              sums);
     return sums;
   }
   CovarianceSums covarianceSums() const
   {
     CovarianceSums sums;
-    kernel().accumulateCovariance(model, residual, kernelView(), state(), sums);
+    kernel().accumulateCovariance(Precision::Double,
+                                  model,
+                                  residual,
+                                  kernelView(),
+                                  state(),
+                                  sums);
     return sums;
   }
 };
@@ -625,6 +635,10 @@ singlePoint(const Points& points, int i)
   return single;
 }
 
+struct Rounding {
+  double of_terms = 1e-12, of_cancelled = 1e-13;
+};
+
 // The sums by `tested` against those of the reference over single points. Products
 // may be fused in one and not in the other, which changes some units in the last place
 // of terms of which some cancel a hundredfold; what cancels altogether is compared with
@@ -633,9 +647,9 @@ template <typename Sums, typename Accumulate>
 void
 expectSumOfPoints(const PointBatch& batch,
                   const Accumulate& accumulate,
-                  const Kernel& tested)
+                  const Kernel& tested,
+                  const Rounding& rounding = {})
 {
-  constexpr double kRounding = 1e-12, kCancelled = 1e-13;
   const Points points = kernelPoints(batch);
   const Entries<Sums> actual = entriesOf<Sums>(accumulate, tested, points);
   Entries<Sums> expected = Entries<Sums>::Zero(), magnitude = expected;
@@ -652,7 +666,7 @@ expectSumOfPoints(const PointBatch& batch,
     for (std::size_t i = 0; i < size; ++i, ++e)
       EXPECT_NEAR(actual[e],
                   expected[e],
-                  kRounding * magnitude[e] + kCancelled * largest)
+                  rounding.of_terms * magnitude[e] + rounding.of_cancelled * largest)
           << tested.instruction_set << ", entry " << e << " of " << batch.size()
           << " points";
   }
@@ -671,7 +685,7 @@ expectBothAgree(const PointBatch& batch, const Accumulate& accumulate)
 
 TEST_P(KernelSums, SimdSumsAreThoseOfThePointsWithoutPadding)
 {
-  for (int count = 1; count <= 17; ++count) {
+  for (int count = 1; count <= PointBatch::kLaneMultiple + 1; ++count) {
     Random random(static_cast<std::uint64_t>(count));
     const Problem p = problem(random, count);
     State state = p.state();
@@ -680,13 +694,62 @@ TEST_P(KernelSums, SimdSumsAreThoseOfThePointsWithoutPadding)
     expectBothAgree<NormalSums>(
         p.batch,
         [&](const Kernel& code, const Points& points, NormalSums& sums) {
-          code.accumulateNormal(p.model, p.residual, points, state, sums);
+          code.accumulateNormal(Precision::Double,
+                                p.model,
+                                p.residual,
+                                points,
+                                state,
+                                sums);
         });
     expectBothAgree<CovarianceSums>(
         p.batch,
         [&](const Kernel& code, const Points& points, CovarianceSums& sums) {
-          code.accumulateCovariance(p.model, p.residual, points, state, sums);
+          code.accumulateCovariance(Precision::Double,
+                                    p.model,
+                                    p.residual,
+                                    points,
+                                    state,
+                                    sums);
         });
+  }
+}
+
+// What cancels is in double, so that ten operations on floats are what is left of
+// rounding; in sums of products of two of their results, twice that.
+TEST_P(KernelSums, InSinglePrecisionAreRightToSevenDigits)
+{
+  // Where rays all but miss, s^-3 makes eight of one.
+  const double rounding = std::get<2>(GetParam()) > kNoiseSpread ? 8e-6 : 1e-6;
+  const Rounding single{rounding, rounding};
+  for (int count = 1; count <= 2 * PointBatch::kLaneMultiple + 1; count += 3) {
+    Random random(static_cast<std::uint64_t>(count));
+    const Problem p = problem(random, count);
+    State state = p.state();
+    state.centroid[0] += 0.01; // as above
+    expectSumOfPoints<NormalSums>(
+        p.batch,
+        [&](const Kernel& code, const Points& points, NormalSums& sums) {
+          code.accumulateNormal(Precision::Single,
+                                p.model,
+                                p.residual,
+                                points,
+                                state,
+                                sums);
+        },
+        kernel(),
+        single);
+    expectSumOfPoints<CovarianceSums>(
+        p.batch,
+        [&](const Kernel& code, const Points& points, CovarianceSums& sums) {
+          code.accumulateCovariance(Precision::Single,
+                                    p.model,
+                                    p.residual,
+                                    points,
+                                    state,
+                                    sums);
+        },
+        kernel(),
+        single);
   }
 }
 

@@ -210,6 +210,7 @@ TEST(Pattern, CanBeToldFromWhiteErrors)
     FitOptions options;
     options.surface = SurfaceRequest::Paraboloid;
     options.separate_pattern = true;
+    options.polish_tolerance_sigma = 1e-9; // as many digits as there are
     const PatchFit fit = PatchFitter(options).fit(batch);
     ASSERT_TRUE(fit.surface.white);
     const Linearization& white = *fit.surface.white;

@@ -50,7 +50,8 @@ signedType(const Eigen::Vector3d& k)
 
 } // namespace
 
-PatchFitter::PatchFitter(const FitOptions& options) : options_(options)
+PatchFitter::PatchFitter(const FitOptions& options, kernel::Precision coarsest)
+: options_(options), coarsest_(coarsest)
 {
   const std::string error = validityError(options);
   if (!error.empty())
@@ -103,13 +104,33 @@ PatchFitter::fit(PointBatch& batch) const
   batch.applyFloor(options_.sigma_floor_m);
   fit.uninformative_points = batch.removeUninformative();
   fit.points = batch.size();
-  const Model model = modelOf(options_.surface);
-  if (fit.points < kernel::parameterCount(model))
+  if (fit.points < kernel::parameterCount(modelOf(options_.surface)))
     return fit;
   batch.pad();
   if (batch.pattern() != nullptr)
     fit.support = PatternSupport(batch);
+  runStages(batch, coarsest_, fit);
+  return fit;
+}
 
+PatchFit
+PatchFitter::refit(const PointBatch& batch, const PatchFit& coarse) const
+{
+  PatchFit fit;
+  fit.invalid_points = coarse.invalid_points;
+  fit.uninformative_points = coarse.uninformative_points;
+  fit.points = coarse.points;
+  fit.support = coarse.support;
+  runStages(batch, kernel::Precision::Double, fit);
+  return fit;
+}
+
+void
+PatchFitter::runStages(const PointBatch& batch,
+                       kernel::Precision coarsest,
+                       PatchFit& fit) const
+{
+  const Model model = modelOf(options_.surface);
   // Stage I-1 (i): principal axes.
   fit.scatter = measureScatter(batch,
                                options_.debias_scatter,
@@ -117,26 +138,27 @@ PatchFitter::fit(PointBatch& batch) const
   if (!hasExtent(fit.scatter)) {
     fit.status = fit.scatter.covariance.allFinite() ? FitStatus::Degenerate :
                                                       FitStatus::NonFinite;
-    return fit;
+    return;
   }
   // Stage I-1 (i), s != parab: the paper's weighted plane.
   fit.has_plane_stage = !options_.normal_from_pca && wraps(model);
   if (fit.has_plane_stage) {
-    fit.plane = fitSurface(Model::Plane, batch, fit.scatter, fit.support, options_);
+    fit.plane =
+        fitSurface(Model::Plane, batch, fit.scatter, fit.support, options_, coarsest);
     fit.status = fit.plane.status;
     fit.null_space = fit.plane.null_space;
     if (fit.status != FitStatus::Converged)
-      return fit;
+      return;
   }
   // Stage I-2 (for planes: I-1's refit).
-  fit.surface = fitSurface(model, batch, fit.scatter, fit.support, options_);
+  fit.surface = fitSurface(model, batch, fit.scatter, fit.support, options_, coarsest);
   fit.status = fit.surface.status;
   fit.null_space = fit.surface.null_space;
   if (fit.status != FitStatus::Converged && fit.status != FitStatus::IterationLimit)
-    return fit;
+    return;
   if (!curvatureInRange(fit.surface, options_.max_curvature_per_m)) {
     fit.status = FitStatus::CurvatureOutOfRange;
-    return fit;
+    return;
   }
   // Stage I-3, then II-4 to II-9.
   fit.bounded = bound({patchType(fit),
@@ -146,7 +168,6 @@ PatchFitter::fit(PointBatch& batch) const
                        batch.origin()});
   if (fit.status == FitStatus::Converged)
     fit.status = fit.bounded.status;
-  return fit;
 }
 
 } // namespace holdfast

@@ -34,12 +34,17 @@ struct PatchFit {
 /// them once. Const and free of state: one fitter serves any number of threads.
 class PatchFitter {
 public:
+  /// \param coarsest precision that will do.
   /// \throw std::invalid_argument when the options make no sense (validityError).
-  explicit PatchFitter(const FitOptions& options);
+  explicit PatchFitter(const FitOptions& options,
+                       kernel::Precision coarsest = kernel::Precision::Single);
 
   /// The stages in order. Bad data come back as a status, never as an exception.
   /// \param batch is cleaned of invalid points and padded.
   PatchFit fit(PointBatch& batch) const;
+
+  /// The same again, with all digits, for a batch as fit() left it.
+  PatchFit refit(const PointBatch& batch, const PatchFit& coarse) const;
 
   /// Stages II-4 to II-9 again, for a surface near the fitted one (what a second-order
   /// propagation differentiates).
@@ -51,9 +56,14 @@ public:
   }
 
 private:
+  /// From I-1 on. \param fit with the counts and the support of the batch.
+  void runStages(const PointBatch& batch,
+                 kernel::Precision coarsest,
+                 PatchFit& fit) const;
   PatchType patchType(const PatchFit& fit) const;
 
   FitOptions options_;
+  kernel::Precision coarsest_;
   BoundSettings bound_settings_;
   DiscriminationThresholds thresholds_;
 };

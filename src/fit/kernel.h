@@ -144,6 +144,14 @@ namespace reference {
 int countLeadingValid(const Points& points);
 } // namespace reference
 
+/// What the sums are taken in. In single precision the coordinates in the frame, f, the
+/// cost and L, whose terms cancel, are doubles all the same; sums are right to some
+/// 1e-6 of the largest of their kind, for points up to kMostInSingle.
+enum class Precision : std::uint8_t { Single, Double }; // the finer, the larger
+
+/// Beyond these, running sums in single precision lose more digits than one.
+inline constexpr int kMostInSingle = 4096;
+
 /// A bounded patch, coordinates relative to the batch's origin.
 struct PatchForm {
   double R[9]; ///< row-major, local to world
@@ -195,14 +203,16 @@ struct Kernel {
                           double* const out[3]);
 
   /// Sums for one iteration of the fit.
-  void (*accumulateNormal)(Model model,
+  void (*accumulateNormal)(Precision precision,
+                           Model model,
                            Residual residual,
                            const Points& points,
                            const State& state,
                            NormalSums& sums);
 
   /// Sums for the fit's exact covariance.
-  void (*accumulateCovariance)(Model model,
+  void (*accumulateCovariance)(Precision precision,
+                               Model model,
                                Residual residual,
                                const Points& points,
                                const State& state,

@@ -32,6 +32,12 @@ sumOfLanes(double x)
   return x;
 }
 
+void
+sumsOfLanes(const double* v, double* out)
+{
+  *out = *v;
+}
+
 double
 squareRoot(double x)
 {
@@ -52,6 +58,31 @@ allLess(double a, double b)
 
 #include "kernel_point.inl"
 #include "kernel_valid.inl"
+
+// There is but one precision.
+void
+accumulateNormalIn(Precision,
+                   Model model,
+                   Residual residual,
+                   const Points& points,
+                   const State& state,
+                   NormalSums& sums)
+{
+  accumulateNormal(model, residual, points, state, sums);
+}
+
+void
+accumulateCovarianceIn(Precision,
+                       Model model,
+                       Residual residual,
+                       const Points& points,
+                       const State& state,
+                       CovarianceSums& sums)
+{
+  accumulateCovariance(model, residual, points, state, sums);
+}
+
+#include "kernel_table.inl"
 
 struct CrossTermAction {
   const Points& points;

@@ -29,6 +29,47 @@ namespace hn = hwy::HWY_NAMESPACE;
 #include "kernel_number.inl"
 #include "kernel_point.inl"
 
+#if HWY_TARGET == HWY_SCALAR
+namespace single = holdfast::kernel::HWY_NAMESPACE; // which gains nothing
+#else
+namespace single {
+
+namespace wide = holdfast::kernel::HWY_NAMESPACE;
+
+#include "kernel_single.inl"
+
+} // namespace single
+#endif
+
+void
+accumulateNormalIn(Precision precision,
+                   Model model,
+                   Residual residual,
+                   const Points& points,
+                   const State& state,
+                   NormalSums& sums)
+{
+  if (precision == Precision::Single)
+    single::accumulateNormal(model, residual, points, state, sums);
+  else
+    accumulateNormal(model, residual, points, state, sums);
+}
+
+void
+accumulateCovarianceIn(Precision precision,
+                       Model model,
+                       Residual residual,
+                       const Points& points,
+                       const State& state,
+                       CovarianceSums& sums)
+{
+  if (precision == Precision::Double ||
+      !single::accumulateByFeet(model, residual, points, state, sums))
+    accumulateCovariance(model, residual, points, state, sums);
+}
+
+#include "kernel_table.inl"
+
 Kernel
 kernelOfTarget()
 {

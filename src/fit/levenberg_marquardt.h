@@ -14,6 +14,8 @@ struct LevenbergMarquardtOptions {
   /// Stop when the Newton decrement sqrt(g^T H^-1 g) is below this. With a cost of half
   /// a chi-square, the decrement is the length of the remaining step in sigmas.
   double step_tolerance_sigma = 1e-4;
+  /// Costs agree within this share near the minimum, where a step may not lower them.
+  double cost_rounding = 1e-12;
 };
 
 struct LevenbergMarquardtSummary {
@@ -73,9 +75,6 @@ levenbergMarquardt(const Problem& problem,
                    typename Problem::Evaluation& evaluation)
 {
   using Stop = LevenbergMarquardtSummary::Stop;
-  // Costs agree within rounding near the minimum, where a step may not lower them.
-  constexpr double kRounding = 1e-12;
-
   LevenbergMarquardtSummary summary;
   problem.evaluate(state, evaluation);
   if (!std::isfinite(evaluation.cost)) {
@@ -111,7 +110,7 @@ levenbergMarquardt(const Problem& problem,
     ++summary.iterations;
     const auto candidate = problem.retract(state, step);
     problem.evaluate(candidate, trial);
-    if (trial.cost <= evaluation.cost * (1.0 + kRounding)) {
+    if (trial.cost <= evaluation.cost * (1.0 + options.cost_rounding)) {
       state = candidate;
       evaluation = trial;
       damping.lower();

@@ -12,8 +12,9 @@
 namespace holdfast {
 namespace {
 
-// One cache line: the widest vectors, and a multiple of kLaneMultiple doubles.
+// One cache line, and the widest vectors.
 constexpr std::size_t kAlignment = 64;
+constexpr int kDoublesPerLine = kAlignment / sizeof(double);
 
 int
 roundedUp(int n)
@@ -60,7 +61,8 @@ PointBatch::reserve(int n)
     return;
   // An odd number of cache lines: at a power of two, all channels of a point would
   // compete for one set of the cache.
-  const int capacity = roundedUp(n) | kLaneMultiple;
+  static_assert(kLaneMultiple % (2 * kDoublesPerLine) == 0);
+  const int capacity = roundedUp(n) + kDoublesPerLine;
   const std::size_t bytes =
       sizeof(double) * kChannels * static_cast<std::size_t>(capacity);
   std::unique_ptr<double[], Deleter> data(

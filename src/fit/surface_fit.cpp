@@ -17,12 +17,38 @@ namespace holdfast {
 namespace {
 
 using kernel::Model;
+using kernel::Precision;
 using Matrix36 = Eigen::Matrix<double, 3, 6>;
 
 // Pivots of the normal equations scaled to unit diagonal: the share of a parameter's
 // information that the others do not explain. Below 1e-10 it is rounding: the float
 // coordinates of a cloud carry 7 digits, and the pivot is of second order in them.
 constexpr double kSmallestPivot = 1e-10;
+
+// Single precision leaves some 1e-7 of a parameter's information; of what the others do
+// not explain, this is the least share in which a ten-thousandth of the covariance can
+// be had.
+constexpr double kSmallestSinglePivot = 1e-3;
+
+// Costs that differ by less are equal within rounding.
+constexpr double
+costRounding(Precision precision)
+{
+  return precision == Precision::Single ? 1e-6 : 1e-12;
+}
+
+// Whoever asks for more digits than the options' defaults gets them; so does who has
+// the covariance made of two fits, whose terms cancel.
+Precision
+precisionFor(const FitOptions& options, const kernel::Points& points)
+{
+  const bool defaults_will_do =
+      options.polish_tolerance_sigma >= FitOptions().polish_tolerance_sigma;
+  return defaults_will_do && options.normal_from_pca &&
+                 points.padded_size <= kernel::kMostInSingle ?
+             Precision::Single :
+             Precision::Double;
+}
 
 // Exact Newton steps at the end; each squares the error, so more than a few mean
 // trouble.
@@ -46,6 +72,7 @@ struct SurfaceProblem {
     ThetaMatrix JtJ = ThetaMatrix::Identity();
   };
 
+  Precision precision;
   Model model;
   Residual residual;
   kernel::Points points;
@@ -56,7 +83,8 @@ struct SurfaceProblem {
   void evaluate(const State& state, Evaluation& evaluation) const
   {
     kernel::NormalSums sums;
-    kernel::kernel().accumulateNormal(model,
+    kernel::kernel().accumulateNormal(precision,
+                                      model,
                                       residual,
                                       points,
                                       kernelState(state, scatter),
@@ -314,7 +342,8 @@ private:
                   const UnboundedSurface& surface,
                   kernel::CovarianceSums& sums) const
   {
-    kernel::kernel().accumulateCovariance(problem_.model,
+    kernel::kernel().accumulateCovariance(problem_.precision,
+                                          problem_.model,
                                           problem_.residual,
                                           points,
                                           kernelState(surface, problem_.scatter),
@@ -348,6 +377,7 @@ polish(const SurfaceProblem& problem, const FitOptions& options, SurfaceFit& fit
     if (sums.cost > start_cost + kClimb)
       break;
     const ScaledCholesky cholesky(fit.linearization.H, problem.model);
+    fit.smallest_pivot = cholesky.smallestPivot();
     if (cholesky.smallestPivot() < kSmallestPivot) {
       fit.status = FitStatus::Degenerate;
       fit.null_space = nullSpaceOf(fit.linearization.H, problem.model);
@@ -396,10 +426,11 @@ approach(SurfaceProblem problem, const FitOptions& options, UnboundedSurface& su
   constexpr double kNear = 2.0;
   problem.residual = Residual::Sampson;
   SurfaceProblem::Evaluation evaluation;
-  return levenbergMarquardt(problem,
-                            {options.max_iterations, kNear},
-                            surface,
-                            evaluation)
+  return levenbergMarquardt(
+             problem,
+             {options.max_iterations, kNear, costRounding(problem.precision)},
+             surface,
+             evaluation)
       .iterations;
 }
 
@@ -409,7 +440,8 @@ descend(const SurfaceProblem& problem, const FitOptions& options, SurfaceFit& fi
 {
   SurfaceProblem::Evaluation evaluation;
   const LevenbergMarquardtOptions lm{options.max_iterations,
-                                     options.step_tolerance_sigma};
+                                     options.step_tolerance_sigma,
+                                     costRounding(problem.precision)};
   const auto summary = levenbergMarquardt(problem, lm, fit.surface, evaluation);
   fit.iterations += summary.iterations;
   fit.status = statusOf(summary.stop);
@@ -457,6 +489,21 @@ fitThick(const SurfaceProblem& problem,
   };
   const SurfaceFit steeper = fitFlattened(0.8), flatter = fitFlattened(0.65);
   return isBetter(flatter, steeper) ? flatter : steeper;
+}
+
+SurfaceFit
+fitFrom(const UnboundedSurface& start,
+        const SurfaceProblem& problem,
+        const FitOptions& options)
+{
+  if (wraps(problem.model) && isThick(problem.scatter))
+    return fitThick(problem, options, start);
+  SurfaceFit fit;
+  fit.surface = start;
+  if (options.residual == Residual::Ray && problem.model != Model::Plane)
+    fit.iterations = approach(problem, options, fit.surface);
+  descend(problem, options, fit);
+  return fit;
 }
 
 } // namespace
@@ -570,24 +617,28 @@ fitSurface(kernel::Model model,
            const PointBatch& batch,
            const Scatter& scatter,
            const PatternSupport& support,
-           const FitOptions& options)
+           const FitOptions& options,
+           Precision coarsest)
 {
-  const SurfaceProblem problem{model,
-                               options.residual,
-                               kernelPoints(batch),
-                               scatter,
-                               batch,
-                               support};
+  const kernel::Points points = kernelPoints(batch);
   const UnboundedSurface start = withModel(model, [&](auto m) {
-    return m.start({options.residual, problem.points, scatter});
+    return m.start({options.residual, points, scatter});
   });
-  if (wraps(model) && isThick(scatter))
-    return fitThick(problem, options, start);
-  SurfaceFit fit;
-  fit.surface = start;
-  if (options.residual == Residual::Ray && model != Model::Plane)
-    fit.iterations = approach(problem, options, fit.surface);
-  descend(problem, options, fit);
+  SurfaceProblem problem{std::max(coarsest, precisionFor(options, points)),
+                         model,
+                         options.residual,
+                         points,
+                         scatter,
+                         batch,
+                         support};
+  SurfaceFit fit = fitFrom(start, problem, options);
+  const bool is_enough =
+      fit.status == FitStatus::Converged && fit.smallest_pivot >= kSmallestSinglePivot;
+  if (problem.precision == Precision::Single && !is_enough) {
+    problem.precision = Precision::Double;
+    fit = fitFrom(start, problem, options);
+  }
+  fit.precision = problem.precision;
   return fit;
 }
 

@@ -41,6 +41,8 @@ struct SurfaceFit {
   int iterations = 0;
   int polish_steps = 0;
   ThetaMatrix JtJ = ThetaMatrix::Identity(); ///< Gauss-Newton part of the Hessian
+  double smallest_pivot = 0.0; ///< of the Hessian scaled to unit diagonal
+  kernel::Precision precision = kernel::Precision::Double; ///< of the sums
   Linearization linearization;
   /// The same with the errors alone that points do not share; when asked for.
   std::optional<Linearization> white;
@@ -80,11 +82,13 @@ Eigen::Matrix<double, 3, 6> normalJacobian(const Eigen::Matrix3d& C,
 /// Weighted fit of one surface: closed-form start, Levenberg-Marquardt, exact Newton
 /// steps at the end, and the linearization there.
 /// \param support of the batch; used where it has a pattern.
+/// \param coarsest precision that will do.
 SurfaceFit fitSurface(kernel::Model model,
                       const PointBatch& batch,
                       const Scatter& scatter,
                       const PatternSupport& support,
-                      const FitOptions& options);
+                      const FitOptions& options,
+                      kernel::Precision coarsest = kernel::Precision::Single);
 
 /// Inverse of a positive definite matrix.
 ThetaMatrix symmetricInverse(const ThetaMatrix& H);

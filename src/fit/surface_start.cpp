@@ -129,7 +129,8 @@ double
 costOf(const UnboundedSurface& surface, const StartRequest& request)
 {
   kernel::NormalSums sums;
-  kernel::kernel().accumulateNormal(surface.model,
+  kernel::kernel().accumulateNormal(kernel::Precision::Double,
+                                    surface.model,
                                     request.residual,
                                     request.points,
                                     kernelState(surface, request.scatter),

@@ -351,6 +351,7 @@ statusOf(const PatchFit& fit, const PatchCovariance& uncertainty)
   // No covariance: its terms have cancelled down to rounding.
   const bool is_degenerate =
       !isPositiveSemiDefiniteByPivots(uncertainty.state) ||
+      !isPositiveSemiDefiniteByPivots(uncertainty.parameters) ||
       (has_axis && !(curvatureInSigmas(fit.bounded.patch, uncertainty.parameters) >=
                      kNoCurvatureSigmas)) ||
       tiltSigma(type, uncertainty.state) > kUndeterminedTilt;

@@ -39,7 +39,7 @@ public:
     kChannels
   };
   // clang-format on
-  static constexpr int kLaneMultiple = 8;
+  static constexpr int kLaneMultiple = 16;
 
   /// Forgets all points; `origin` in world coordinates should be near the points to
   /// come. The viewpoint is the world's origin again, and there is no pattern.
