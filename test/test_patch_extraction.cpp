@@ -421,7 +421,7 @@ TEST(Acceptance, NoPatchReachesOverAnEdge)
   EXPECT_GT(result.turned_down.at(PatchVerdict::OverEdge), 5);
   const double edge = (79.5 - kCamera.cx) / kCamera.fx; // x of the table's, at 1 m
   for (const ExtractedPatch& patch : result.patches) {
-    EXPECT_LE(patch.validation->stray_share, 0.02);
+    EXPECT_LE(patch.validation->stray_share.value(), 0.02);
     const Patch& fitted = patch.fit.patch;
     if (fitted.c.z() > 1.15)
       continue;

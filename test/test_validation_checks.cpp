@@ -258,7 +258,8 @@ TEST(Verdicts, OnWhatIsMeasuredInRadii)
               PatchVerdict::DepartureTooLarge);
   ValidationOptions options = kNone;
   options.max_view_angle_rad = 1.5;
-  const double angle = validate(fit.result, fit.batch, options).view_angle_rad;
+  EXPECT_FALSE(measured.view_angle_rad);
+  const double angle = validate(fit.result, fit.batch, options).view_angle_rad.value();
   const Eigen::Vector3d ray = fit.batch.viewpoint() - fit.result.patch.c;
   EXPECT_NEAR(std::cos(angle), fit.result.patch.normal().dot(ray.normalized()), 1e-12);
   expectLimit(&ValidationOptions::max_view_angle_rad,

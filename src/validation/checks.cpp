@@ -16,37 +16,18 @@ isWithin(double value, std::optional<double> limit)
   return !limit || value <= *limit;
 }
 
+// What was not measured passes.
+bool
+isWithin(std::optional<double> value, std::optional<double> limit)
+{
+  return !value || isWithin(*value, limit);
+}
+
 // The same of a length in terms of the radius.
 bool
 isWithinRadii(double length_m, std::optional<double> limit, double radius_m)
 {
   return radius_m <= 0.0 || !limit || length_m <= *limit * radius_m;
-}
-
-PatchVerdict
-judge(const Validation& measured, const ValidationOptions& options, double radius_m)
-{
-  if (measured.residual.points == 0)
-    return PatchVerdict::NotUsable;
-  if (!isWithinRadii(measured.extent_m, options.max_extent, radius_m))
-    return PatchVerdict::ExtentTooLarge;
-  if (!isWithinRadii(measured.sagitta_m, options.max_sagitta, radius_m))
-    return PatchVerdict::SagittaTooLarge;
-  if (!isWithin(measured.curvature_per_m, options.max_curvature_per_m) ||
-      (radius_m > 0.0 &&
-       !isWithin(measured.curvature_per_m * radius_m, options.max_bend)))
-    return PatchVerdict::CurvatureTooLarge;
-  if (!isWithin(measured.view_angle_rad, options.max_view_angle_rad))
-    return PatchVerdict::NormalNotSeen;
-  if (!isWithin(measured.residual.rms_m, options.max_residual_m))
-    return PatchVerdict::ResidualTooLarge;
-  if (!isWithinRadii(measured.residual.largest_m, options.max_departure, radius_m))
-    return PatchVerdict::DepartureTooLarge;
-  if (options.min_coverage && !(measured.coverage.share >= *options.min_coverage))
-    return PatchVerdict::CoverageTooLow;
-  if (!isWithin(measured.chi2_per_dof, options.max_chi2_per_dof))
-    return PatchVerdict::ChiSquareTooLarge;
-  return PatchVerdict::Accepted;
 }
 
 // Of the state's moments: bounds depend on the containment, too.
@@ -66,7 +47,7 @@ sagittaOf(const Patch& patch)
   return 0.5 * kappa * d * d;
 }
 
-double
+std::optional<double>
 viewAngle(const Patch& patch, const PointBatch& points)
 {
   const Eigen::Vector3d ray = points.viewpoint() - patch.c;
@@ -74,10 +55,10 @@ viewAngle(const Patch& patch, const PointBatch& points)
   return std::acos(std::clamp(cosine, -1.0, 1.0));
 }
 
-double
+std::optional<double>
 viewAngle(const Patch&, const std::vector<Eigen::Vector3d>&)
 {
-  return 0.0;
+  return std::nullopt;
 }
 
 template <typename Points>
@@ -101,7 +82,7 @@ check(const FitResult& fit,
   validation.residual = measureResidual(fit.patch, points);
   validation.coverage = measureCoverage(fit.patch, points, options.coverage);
   validation.chi2_per_dof = chi2PerDof(fit);
-  validation.verdict = judge(validation, options, radius_m);
+  validation.verdict = verdictOf(validation, options, radius_m);
   return validation;
 }
 
@@ -150,6 +131,34 @@ std::string_view
 verdictName(PatchVerdict verdict)
 {
   return kVerdictNames.of(verdict);
+}
+
+PatchVerdict
+verdictOf(const Validation& measured, const ValidationOptions& options, double radius_m)
+{
+  if (measured.residual.points == 0)
+    return PatchVerdict::NotUsable;
+  if (!isWithinRadii(measured.extent_m, options.max_extent, radius_m))
+    return PatchVerdict::ExtentTooLarge;
+  if (!isWithinRadii(measured.sagitta_m, options.max_sagitta, radius_m))
+    return PatchVerdict::SagittaTooLarge;
+  if (!isWithin(measured.curvature_per_m, options.max_curvature_per_m) ||
+      (radius_m > 0.0 &&
+       !isWithin(measured.curvature_per_m * radius_m, options.max_bend)))
+    return PatchVerdict::CurvatureTooLarge;
+  if (!isWithin(measured.view_angle_rad, options.max_view_angle_rad))
+    return PatchVerdict::NormalNotSeen;
+  if (!isWithin(measured.residual.rms_m, options.max_residual_m))
+    return PatchVerdict::ResidualTooLarge;
+  if (!isWithinRadii(measured.residual.largest_m, options.max_departure, radius_m))
+    return PatchVerdict::DepartureTooLarge;
+  if (options.min_coverage && !(measured.coverage.share >= *options.min_coverage))
+    return PatchVerdict::CoverageTooLow;
+  if (!isWithin(measured.chi2_per_dof, options.max_chi2_per_dof))
+    return PatchVerdict::ChiSquareTooLarge;
+  if (!isWithin(measured.stray_share, options.max_stray))
+    return PatchVerdict::OverEdge;
+  return PatchVerdict::Accepted;
 }
 
 Validation

@@ -87,8 +87,8 @@ enum class PatchVerdict : std::uint8_t {
 /// "accepted", "curvature_too_large", ... as in the program's JSON.
 std::string_view verdictName(PatchVerdict verdict);
 
-/// The verdict and what was measured, which is there whatever the limits, unless the
-/// fit is not usable.
+/// The verdict and what was measured, which is there whatever the limits unless stated,
+/// if the fit is usable.
 struct Validation {
   PatchVerdict verdict = PatchVerdict::NotUsable;
   double curvature_per_m = 0.0; ///< largest magnitude at the centre
@@ -98,12 +98,22 @@ struct Validation {
   /// By how much the surface rises at most over its tangent plane within the bounds, m:
   /// the stronger curvature over the longer bound.
   double sagitta_m = 0.0;
-  double view_angle_rad = 0.0; ///< zero where the viewpoint is unknown
-  double stray_share = 0.0; ///< zero where it was not asked for
+  /// Nothing without a limit, or where the viewpoint is unknown.
+  std::optional<double> view_angle_rad;
+  /// Nothing without a limit, where pixels cannot tell, or where another check had
+  /// turned the patch down.
+  std::optional<double> stray_share;
   SurfaceResidual residual;
   Coverage coverage;
   double chi2_per_dof = 0.0; ///< zero without degrees of freedom
 };
+
+/// What other limits say of what was measured before. What was not measured then
+/// passes.
+/// \param radius_m as validate()
+PatchVerdict verdictOf(const Validation& measured,
+                       const ValidationOptions& options,
+                       double radius_m = 0.0);
 
 /// Checks a fit against the points it was made from. Takes no memory from the heap, and
 /// a fraction of the time of the fit.
