@@ -399,7 +399,7 @@ TEST(Acceptance, ByDefaultGivesPatchesOfTheirRadiusOnly)
       EXPECT_EQ(measured.verdict, PatchVerdict::Accepted);
       EXPECT_LE(measured.extent_m, 1.3 * radius);
       EXPECT_LE(measured.sagitta_m, 0.5 * radius);
-      EXPECT_LE(measured.residual.largest_m, radius / 3.0);
+      EXPECT_LE(measured.residual.unexplained_m, radius / 3.0);
       EXPECT_LE(measured.chi2_per_dof, 3.0);
       EXPECT_GE(measured.coverage.share, 0.5);
     }

@@ -17,6 +17,7 @@ constexpr VariedLimit kVaried[] = {
     {"max_sagitta", &ValidationOptions::max_sagitta, 0.5, 2.0},
     {"max_bend", &ValidationOptions::max_bend, 0.5, 2.0},
     {"max_departure", &ValidationOptions::max_departure, 0.5, 2.0},
+    {"max_noise", &ValidationOptions::max_noise, 0.5, 2.0},
     {"max_stray", &ValidationOptions::max_stray, 0.5, 2.0},
     {"max_view_angle_rad", &ValidationOptions::max_view_angle_rad, 0.5, 0.8},
     {"min_coverage", &ValidationOptions::min_coverage, 1.5, 0.5},

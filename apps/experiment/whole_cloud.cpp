@@ -208,12 +208,12 @@ public:
     return verdict(limits, patch) == PatchVerdict::Accepted;
   }
 
-  /// What is not seen in the whole is not seen in a part.
+  /// What is not seen in the whole is not seen in a part, and a part has its noise.
   bool triesAgain(std::size_t limits, const ExtractedPatch& first) const
   {
     const PatchVerdict said = verdict(limits, first);
     return isUsable(first.fit.status) && said != PatchVerdict::Accepted &&
-           said != PatchVerdict::NormalNotSeen;
+           said != PatchVerdict::NormalNotSeen && said != PatchVerdict::NoiseTooLarge;
   }
 
 private:

@@ -170,11 +170,13 @@ writeMeasured(const Validation& validation, Json& patch)
 {
   patch["verdict"] = verdictName(validation.verdict);
   patch["residual"] = {{"rms", validation.residual.rms_m},
-                       {"largest", validation.residual.largest_m}};
+                       {"largest", validation.residual.largest_m},
+                       {"unexplained", validation.residual.unexplained_m}};
   patch["coverage"] = validation.coverage.share;
   patch["measured"] = {{"extent", validation.extent_m},
                        {"sagitta", validation.sagitta_m},
                        {"curvature", validation.curvature_per_m},
+                       {"noise", validation.noise_m},
                        {"view_angle", optionalJson(validation.view_angle_rad)},
                        {"stray", optionalJson(validation.stray_share)}};
 }
@@ -189,6 +191,7 @@ validationJson(const std::optional<ValidationOptions>& validation)
           {"max_sagitta", optionalJson(validation->max_sagitta)},
           {"max_bend", optionalJson(validation->max_bend)},
           {"max_departure", optionalJson(validation->max_departure)},
+          {"max_noise", optionalJson(validation->max_noise)},
           {"max_stray", optionalJson(validation->max_stray)},
           {"max_view_angle", optionalJson(validation->max_view_angle_rad)},
           {"max_curvature", optionalJson(validation->max_curvature_per_m)},
@@ -401,6 +404,8 @@ readMeasured(const Json& json, const FitResult& fit)
   validation.verdict = known(kVerdictNames.find(verdict), verdict);
   validation.residual.rms_m = number(residual.at("rms"));
   validation.residual.largest_m = number(residual.at("largest"));
+  validation.residual.unexplained_m =
+      number(residual.value("unexplained", Json(validation.residual.largest_m)));
   validation.coverage.share = number(json.at("coverage"));
   validation.chi2_per_dof = chi2PerDof(fit);
   const Json measured = json.value("measured", Json());
@@ -409,6 +414,7 @@ readMeasured(const Json& json, const FitResult& fit)
   validation.extent_m = number(measured.at("extent"));
   validation.sagitta_m = number(measured.at("sagitta"));
   validation.curvature_per_m = number(measured.at("curvature"));
+  validation.noise_m = number(measured.at("noise"));
   const auto optional = [](const Json& value) {
     return value.is_null() ? std::nullopt : std::optional(value.get<double>());
   };

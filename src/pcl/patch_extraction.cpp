@@ -253,7 +253,8 @@ bool
 deservesSecondAttempt(const ExtractedPatch& patch)
 {
   return isUsable(patch.fit.status) && !isAccepted(patch) &&
-         patch.validation->verdict != PatchVerdict::NormalNotSeen;
+         patch.validation->verdict != PatchVerdict::NormalNotSeen &&
+         patch.validation->verdict != PatchVerdict::NoiseTooLarge;
 }
 
 /// Working memory of one thread.

@@ -47,6 +47,24 @@ sagittaOf(const Patch& patch)
   return 0.5 * kappa * d * d;
 }
 
+double
+noiseOf(const PointBatch& points)
+{
+  const double* xx = points.channel(PointBatch::SXX);
+  const double* yy = points.channel(PointBatch::SYY);
+  const double* zz = points.channel(PointBatch::SZZ);
+  double sum = 0.0;
+  for (int i = 0; i < points.size(); ++i)
+    sum += xx[i] + yy[i] + zz[i];
+  return std::sqrt(sum / std::max(points.size(), 1));
+}
+
+double
+noiseOf(const std::vector<Eigen::Vector3d>&)
+{
+  return 0.0;
+}
+
 std::optional<double>
 viewAngle(const Patch& patch, const PointBatch& points)
 {
@@ -79,6 +97,7 @@ check(const FitResult& fit,
   validation.sagitta_m = sagittaOf(fit.patch);
   if (options.max_view_angle_rad)
     validation.view_angle_rad = viewAngle(fit.patch, points);
+  validation.noise_m = noiseOf(points);
   validation.residual = measureResidual(fit.patch, points);
   validation.coverage = measureCoverage(fit.patch, points, options.coverage);
   validation.chi2_per_dof = chi2PerDof(fit);
@@ -96,6 +115,7 @@ ValidationOptions::withoutLimits()
                            &ValidationOptions::max_sagitta,
                            &ValidationOptions::max_bend,
                            &ValidationOptions::max_departure,
+                           &ValidationOptions::max_noise,
                            &ValidationOptions::max_stray,
                            &ValidationOptions::max_view_angle_rad,
                            &ValidationOptions::min_coverage,
@@ -113,6 +133,7 @@ validityError(const ValidationOptions& options)
       {&ValidationOptions::max_sagitta, "max_sagitta"},
       {&ValidationOptions::max_bend, "max_bend"},
       {&ValidationOptions::max_departure, "max_departure"},
+      {&ValidationOptions::max_noise, "max_noise"},
       {&ValidationOptions::max_stray, "max_stray"},
       {&ValidationOptions::max_view_angle_rad, "max_view_angle_rad"},
       {&ValidationOptions::max_curvature_per_m, "max_curvature_per_m"},
@@ -138,6 +159,8 @@ verdictOf(const Validation& measured, const ValidationOptions& options, double r
 {
   if (measured.residual.points == 0)
     return PatchVerdict::NotUsable;
+  if (!isWithinRadii(measured.noise_m, options.max_noise, radius_m))
+    return PatchVerdict::NoiseTooLarge;
   if (!isWithinRadii(measured.extent_m, options.max_extent, radius_m))
     return PatchVerdict::ExtentTooLarge;
   if (!isWithinRadii(measured.sagitta_m, options.max_sagitta, radius_m))
@@ -150,7 +173,7 @@ verdictOf(const Validation& measured, const ValidationOptions& options, double r
     return PatchVerdict::NormalNotSeen;
   if (!isWithin(measured.residual.rms_m, options.max_residual_m))
     return PatchVerdict::ResidualTooLarge;
-  if (!isWithinRadii(measured.residual.largest_m, options.max_departure, radius_m))
+  if (!isWithinRadii(measured.residual.unexplained_m, options.max_departure, radius_m))
     return PatchVerdict::DepartureTooLarge;
   if (options.min_coverage && !(measured.coverage.share >= *options.min_coverage))
     return PatchVerdict::CoverageTooLow;

@@ -4,11 +4,24 @@
 #include <holdfast/fit/point_batch.h>
 #include <holdfast/geometry/pose.h>
 
+#include <cstddef>
+#include <type_traits>
 #include <vector>
 
 namespace holdfast {
 
-/// Calls visit(local) for every finite point.
+/// visit(local), or visit(local, i) where that is what it takes.
+template <typename Visit>
+void
+visitLocal(Visit& visit, const Eigen::Vector3d& local, std::size_t i)
+{
+  if constexpr (std::is_invocable_v<Visit&, const Eigen::Vector3d&, std::size_t>)
+    visit(local, i);
+  else
+    visit(local);
+}
+
+/// Calls visit(local), or visit(local, i), for every finite point i.
 template <typename Visit>
 void
 forEachLocal(const Pose& pose, const PointBatch& points, Visit&& visit)
@@ -24,7 +37,7 @@ forEachLocal(const Pose& pose, const PointBatch& points, Visit&& visit)
     const Eigen::Vector3d local =
         axes.col(0) * x[i] + axes.col(1) * y[i] + axes.col(2) * z[i] + shift;
     if (local.allFinite())
-      visit(local);
+      visitLocal(visit, local, static_cast<std::size_t>(i));
   }
 }
 
@@ -34,10 +47,10 @@ forEachLocal(const Pose& pose,
              const std::vector<Eigen::Vector3d>& points,
              Visit&& visit)
 {
-  for (const Eigen::Vector3d& point : points) {
-    const Eigen::Vector3d local = pose.toLocal(point);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3d local = pose.toLocal(points[i]);
     if (local.allFinite())
-      visit(local);
+      visitLocal(visit, local, i);
   }
 }
 

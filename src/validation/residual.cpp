@@ -190,6 +190,40 @@ approximateDistance(const LocalSurface& surface, const Eigen::Vector3d& q)
   return -rootAlongGradient(surface, q) * surface.halfGradient(q).norm();
 }
 
+// Of single points along a direction.
+class NoiseAlong {
+public:
+  NoiseAlong(const Eigen::Vector3d& n, const PointBatch& points)
+  {
+    const auto add = [&](PointBatch::Channel channel, double factor) {
+      channels_[terms_] = points.channel(channel);
+      factors_[terms_++] = factor;
+    };
+    add(PointBatch::SXX, n.x() * n.x());
+    add(PointBatch::SXY, 2.0 * n.x() * n.y());
+    add(PointBatch::SXZ, 2.0 * n.x() * n.z());
+    add(PointBatch::SYY, n.y() * n.y());
+    add(PointBatch::SYZ, 2.0 * n.y() * n.z());
+    add(PointBatch::SZZ, n.z() * n.z());
+  }
+
+  // Without covariances nothing is noise.
+  NoiseAlong(const Eigen::Vector3d&, const std::vector<Eigen::Vector3d>&) {}
+
+  double variance(std::size_t point) const
+  {
+    double sum = 0.0;
+    for (int k = 0; k < terms_; ++k)
+      sum += factors_[k] * channels_[k][point];
+    return sum;
+  }
+
+private:
+  int terms_ = 0;
+  const double* channels_[6] = {};
+  double factors_[6] = {};
+};
+
 template <typename Points>
 SurfaceResidual
 measure(const Patch& patch, const Points& points)
@@ -197,14 +231,20 @@ measure(const Patch& patch, const Points& points)
   // The approximation is right to a thousandth below this distance: 0.08^2/8/0.92^2.
   const LocalSurface surface(patch);
   const double trusted = 0.08 / surface.k.lpNorm<Eigen::Infinity>();
+  const Pose pose = patch.pose();
+  const NoiseAlong noise(pose.R.col(2), points);
+  constexpr double kNoise = kNoiseSigmas * kNoiseSigmas;
   SurfaceResidual residual;
   double sum = 0.0;
-  forEachLocal(patch.pose(), points, [&](const Eigen::Vector3d& q) {
+  forEachLocal(pose, points, [&](const Eigen::Vector3d& q, std::size_t i) {
     double distance = std::abs(approximateDistance(surface, q));
     if (!(distance <= trusted))
       distance = std::abs(exactDistance(surface, q));
     sum += distance * distance;
     residual.largest_m = std::max(residual.largest_m, distance);
+    if (distance > residual.unexplained_m &&
+        distance * distance > kNoise * noise.variance(i))
+      residual.unexplained_m = distance;
     ++residual.points;
   });
   if (residual.points > 0)
