@@ -196,7 +196,11 @@ addLimitsInRadii(CLI::App& command, ValidationOptions& limits)
   add("--max-bend", limits.max_bend, "Turn down patches of a larger curvature");
   add("--max-departure",
       limits.max_departure,
-      "Turn down patches with a point further from the surface");
+      "Turn down patches with a point further from the surface, and further than its "
+      "noise explains");
+  add("--max-noise",
+      limits.max_noise,
+      "Turn down patches whose single points are less sure (rms)");
 }
 
 void

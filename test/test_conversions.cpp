@@ -4,6 +4,7 @@
 #include <holdfast/geometry/constants.h>
 #include <holdfast/io/patch_io.h>
 #include <holdfast/pcl/conversions.h>
+#include <holdfast/validation/names.h>
 
 #include <gtest/gtest.h>
 
@@ -153,6 +154,17 @@ TEST(PatchPoints, OfPatchesNotAcceptedAreNaNAndSayWhy)
   EXPECT_FALSE(std::isnan(point.coverage));
   EXPECT_EQ(toPatchPoint(failed).verdict, static_cast<int>(PatchVerdict::NotUsable));
   EXPECT_FALSE(toPatchCloud({turned_down}, {}).is_dense);
+}
+
+TEST(PatchPoints, KeepEveryVerdict)
+{
+  Random random;
+  ExtractedPatch patch = randomExtracted(random, kPatchTypes[0]);
+  for (int i = 0; i < static_cast<int>(kVerdictNames.words.size()); ++i) {
+    patch.validation->verdict = static_cast<PatchVerdict>(i);
+    EXPECT_EQ(toExtractedPatch(toPatchPoint(patch)).validation->verdict,
+              patch.validation->verdict);
+  }
 }
 
 TEST(PatchPoints, ThatAreNoneThrow)

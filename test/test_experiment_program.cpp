@@ -159,6 +159,8 @@ TEST_F(ExperimentProgram, NeighborhoodsShowThatSmallBallsCutTheNoise)
   for (const Json& row : json.at("rows")) {
     SCOPED_TRACE(row.dump());
     const std::string kind = row.at("neighborhood");
+    if (row.at("scene") != "plane")
+      continue;
     const double tilt = row.at("tilt_rad"), extent = row.at("extent");
     // A disc of pixels stretches by 1/cos, a patch does not.
     if (kind == "patch" && tilt < 1.2 && row.at("radius_m") > 0.02) {
@@ -177,6 +179,31 @@ TEST_F(ExperimentProgram, NeighborhoodsShowThatSmallBallsCutTheNoise)
       EXPECT_LT(row.at("chi2_ratio").get<double>(), 0.85);
     }
   }
+}
+
+// Of edges within the radius, a patch finds all but a few where another surface lies 10
+// cm behind; a disc of pixels goes on where they meet.
+TEST_F(ExperimentProgram, NeighborhoodsOfRocksAndEdges)
+{
+  const Json json = shortRun("neighborhoods");
+  int rows = 0;
+  for (const Json& row : json.at("rows")) {
+    SCOPED_TRACE(row.dump());
+    if (row.at("scene") == "plane")
+      continue;
+    ++rows;
+    EXPECT_LE(row.at("failures").get<int>(), 10);
+    EXPECT_GT(row.at("extent").get<double>(), 0.3);
+    const double over_edge = row.at("over_edge");
+    if (row.at("scene") == "step" && row.at("neighborhood") == "patch" &&
+        row.at("radius_m") >= 0.05) {
+      EXPECT_NEAR(row.at("chi2_ratio").get<double>(), 1.0, 0.3);
+    }
+    if (row.at("scene") == "ridge" && row.at("neighborhood") == "disc") {
+      EXPECT_GT(over_edge, 0.3);
+    }
+  }
+  EXPECT_EQ(rows, 2 * 3 * 3 * 4); // noise, scenes, radii, kinds
 }
 
 TEST_F(ExperimentProgram, PclIsBiasedWhereHoldfastIsNot)
@@ -230,6 +257,35 @@ TEST_F(ExperimentProgram, ConsistencyHoldsInWholeClouds)
     EXPECT_GT(row.at("unflagged_coverage95").get<double>(), 0.93 - 4.0 * sigma);
   }
   EXPECT_EQ(radii, 3);
+}
+
+TEST_F(ExperimentProgram, ConsistencyShowsWhatEachLimitSelects)
+{
+  const Json plain = shortRun("consistency", {"--scene", "mix"}).at("rows");
+  const Json rows = shortRun("consistency", {"--scene", "mix", "--limits"}).at("rows");
+  const auto found = [&](const std::string& limit, double radius, bool off) {
+    for (const Json& row : rows)
+      if (row.at("limit") == limit && row.at("radius_m") == radius &&
+          row.at("value").is_null() == off && row.at("scene") == "mix")
+        return row;
+    throw std::runtime_error("no row of " + limit);
+  };
+  for (const Json& row : plain) {
+    if (row.at("type") != "all")
+      continue;
+    // The limits are tried on the fits that there are without trying any.
+    const double radius = row.at("radius_m");
+    const Json defaults = found("defaults", radius, true);
+    for (const auto& item : row.items())
+      EXPECT_EQ(defaults.at(item.key()), item.value()) << item.key();
+    const double usual = defaults.at("accepted_rate");
+    EXPECT_LT(usual, found("none", radius, true).at("accepted_rate"));
+    for (const std::string limit :
+         {"max_extent", "max_departure", "max_chi2_per_dof"}) {
+      EXPECT_LE(usual, found(limit, radius, true).at("accepted_rate")) << limit;
+      EXPECT_GE(usual, found(limit, radius, false).at("accepted_rate")) << limit;
+    }
+  }
 }
 
 TEST_F(ExperimentProgram, WholeCloudsDoNotDependOnTheNumberOfThreads)
@@ -401,7 +457,7 @@ TEST_F(ExperimentProgram, WritesTableAndFiles)
   EXPECT_EQ(test::filesIn(out),
             (Names{"neighborhoods.csv", "neighborhoods.json", "neighborhoods.svg"}));
   const std::string csv = test::readFile(out + "/neighborhoods.csv");
-  EXPECT_EQ(csv.rfind("neighborhood,noise,radius_m,tilt_rad,points,", 0), 0u);
+  EXPECT_EQ(csv.rfind("scene,neighborhood,noise,radius_m,tilt_rad,", 0), 0u);
   const Json json = Json::parse(test::readFile(out + "/neighborhoods.json"));
   EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')),
             json.at("rows").size() + 1);
@@ -424,6 +480,8 @@ TEST_F(ExperimentProgram, SaysInOneLineWhatIsWrong)
                           {"consistency", "--scene", "nonsense"},
                           {"consistency", "--sensor", "nonsense"},
                           {"consistency", "--scene", "mix", "--noise-scale", "2"},
+                          {"consistency", "--limits"},
+                          {"consistency", "--scene", "sweep", "mix", "--limits"},
                           {"figure6", "--data", folder_ + "/missing"}}) {
     const test::ProgramRun run = experiment(arguments);
     EXPECT_EQ(run.exit_code, 2) << run.err;

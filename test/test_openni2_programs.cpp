@@ -2,6 +2,12 @@
 // (virtual_kinect). Verdicts depend on what is written, never on how fast.
 #include "support/run_program.h"
 
+#include <holdfast/io/cloud_io.h>
+#include <holdfast/io/config.h>
+#include <holdfast/io/pattern_map_file.h>
+#include <holdfast/pcl/pattern_subtraction.h>
+#include <holdfast/sensor/stereo_noise_model.h>
+
 #include <nlohmann/json.hpp>
 
 #include <fcntl.h>
@@ -224,6 +230,93 @@ TEST(LiveProgram, WritesPatchFilesAndRecordsMeanwhile)
   const auto again = runProgram(folder, {"record", "-o", frames, "--frames", "1"});
   EXPECT_EQ(again.exit_code, 1);
   EXPECT_NE(again.err.find("holds frames already"), std::string::npos) << again.err;
+}
+
+/// A sensor file whose pattern map has another error in every pixel of a small image.
+class MappedSensor {
+public:
+  explicit MappedSensor(const std::string& folder)
+  : file_(folder + "/mapped.yaml"), errors_(320 * 240)
+  {
+    for (std::size_t i = 0; i < errors_.size(); ++i)
+      errors_[i] = static_cast<float>(256 + i % 320) / 1024.0F; // as a file has them
+    Sensor sensor;
+    sensor.name = "mapped";
+    sensor.camera = {320, 240, 290.0, 290.0, 159.5, 119.5};
+    const StereoNoiseModel::Parameters stereo;
+    sensor.noise = std::make_shared<StereoNoiseModel>(stereo);
+    sensor.pattern_map = std::make_shared<const PatternMap>(320, 240, errors_);
+    savePatternMap(folder + "/map.png", *sensor.pattern_map);
+    saveSensor(file_,
+               sensor,
+               {{"sigma_disparity_px", stereo.sigma_disparity_px},
+                {"sigma_point_px", stereo.sigma_point_px},
+                {"baseline_m", stereo.baseline_m},
+                {"focal_px", stereo.focal_px}},
+               {},
+               "map.png");
+    focal_times_baseline_ = stereo.focal_px * stereo.baseline_m;
+  }
+
+  const std::string& file() const
+  {
+    return file_;
+  }
+
+  /// A point of a frame without the error of its pixel.
+  Eigen::Vector3d without(const Eigen::Vector3d& point, std::size_t pixel) const
+  {
+    return withoutDisparityError(point, errors_.at(pixel), focal_times_baseline_);
+  }
+
+private:
+  std::string file_;
+  std::vector<float> errors_;
+  double focal_times_baseline_ = 0.0;
+};
+
+TEST(LiveProgram, SubtractsThePatternMap)
+{
+  const std::string folder = freshFolder("live_map");
+  const MappedSensor sensor(folder);
+  for (const bool subtract : {true, false}) {
+    const std::string frames = folder + (subtract ? "/less" : "/raw");
+    const auto run =
+        runProgram(folder,
+                   Arguments{"live",
+                             "--record",
+                             frames,
+                             "-o",
+                             frames + "_patches",
+                             "--frames",
+                             "1",
+                             "--sensor",
+                             sensor.file()} +
+                       kQuick + Arguments{"--budget-ms", "1e6"} +
+                       (subtract ? Arguments{} : Arguments{"--no-pattern"}));
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    const RangeCloud measured = loadCloud(frames + "/frame_000001.pcd");
+    const Json live =
+        Json::parse(readFile(frames + "_patches/frame_000001.patches.json"));
+    ASSERT_EQ(live["patches"].size(), 20U);
+    for (const Json& patch : live["patches"]) {
+      const std::size_t pixel = patch["seed"]["index"];
+      const Json& seed = patch["seed"]["point"];
+      const Eigen::Vector3d found(seed[0], seed[1], seed[2]);
+      const Eigen::Vector3d point =
+          (*measured.points)[pixel].getVector3fMap().cast<double>();
+      EXPECT_LT((found - (subtract ? sensor.without(point, pixel) : point)).norm(),
+                1e-6);
+    }
+  }
+  const auto other = runProgram(
+      folder,
+      {"live", "--frames", "1", "--size", "640x480", "--sensor", sensor.file()});
+  EXPECT_EQ(other.exit_code, 1);
+  EXPECT_EQ(other.errorLines(), 1) << other.err;
+  EXPECT_NE(other.err.find("where the pattern map of the sensor mapped has 320 x 240"),
+            std::string::npos)
+      << other.err;
 }
 
 TEST(LiveProgram, AnInterruptEndsItWithCompleteFiles)

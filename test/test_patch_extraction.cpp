@@ -399,7 +399,7 @@ TEST(Acceptance, ByDefaultGivesPatchesOfTheirRadiusOnly)
       EXPECT_EQ(measured.verdict, PatchVerdict::Accepted);
       EXPECT_LE(measured.extent_m, 1.3 * radius);
       EXPECT_LE(measured.sagitta_m, 0.5 * radius);
-      EXPECT_LE(measured.residual.largest_m, radius / 3.0);
+      EXPECT_LE(measured.residual.unexplained_m, radius / 3.0);
       EXPECT_LE(measured.chi2_per_dof, 3.0);
       EXPECT_GE(measured.coverage.share, 0.5);
     }
@@ -421,7 +421,7 @@ TEST(Acceptance, NoPatchReachesOverAnEdge)
   EXPECT_GT(result.turned_down.at(PatchVerdict::OverEdge), 5);
   const double edge = (79.5 - kCamera.cx) / kCamera.fx; // x of the table's, at 1 m
   for (const ExtractedPatch& patch : result.patches) {
-    EXPECT_LE(patch.validation->stray_share, 0.02);
+    EXPECT_LE(patch.validation->stray_share.value(), 0.02);
     const Patch& fitted = patch.fit.patch;
     if (fitted.c.z() > 1.15)
       continue;

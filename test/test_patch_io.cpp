@@ -78,6 +78,13 @@ someReport()
     validation.residual.rms_m = random.uniform(0.0, 0.01);
     validation.residual.largest_m = random.uniform(0.01, 0.02);
     validation.coverage.share = random.uniform(0.0, 1.0);
+    validation.extent_m = random.uniform(0.0, 0.1);
+    validation.noise_m = random.uniform(0.0, 0.1);
+    validation.residual.unexplained_m = random.uniform(0.0, 0.01);
+    validation.sagitta_m = random.uniform(0.0, 0.1);
+    validation.curvature_per_m = random.uniform(0.0, 10.0);
+    validation.view_angle_rad = random.uniform(0.0, 1.5);
+    validation.chi2_per_dof = chi2PerDof(fit);
     report.result.patches.push_back(extracted);
   }
   return report;
@@ -123,6 +130,15 @@ TEST(PatchIo, JsonComesBackBitForBit)
       EXPECT_EQ(a.validation->residual.rms_m, b.validation->residual.rms_m);
       EXPECT_EQ(a.validation->residual.largest_m, b.validation->residual.largest_m);
       EXPECT_EQ(a.validation->coverage.share, b.validation->coverage.share);
+      EXPECT_EQ(a.validation->extent_m, b.validation->extent_m);
+      EXPECT_EQ(a.validation->noise_m, b.validation->noise_m);
+      EXPECT_EQ(a.validation->residual.unexplained_m,
+                b.validation->residual.unexplained_m);
+      EXPECT_EQ(a.validation->sagitta_m, b.validation->sagitta_m);
+      EXPECT_EQ(a.validation->curvature_per_m, b.validation->curvature_per_m);
+      EXPECT_EQ(a.validation->view_angle_rad, b.validation->view_angle_rad);
+      EXPECT_EQ(a.validation->stray_share, b.validation->stray_share);
+      EXPECT_EQ(a.validation->chi2_per_dof, b.validation->chi2_per_dof);
     }
   }
 }
@@ -190,6 +206,7 @@ TEST(PatchIo, JsonHasTheDocumentedMembers)
                                       "verdict",
                                       "residual",
                                       "coverage",
+                                      "measured",
                                       "second_attempt",
                                       "seed",
                                       "radius"}));

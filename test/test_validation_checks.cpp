@@ -227,7 +227,8 @@ TEST(Verdicts, OnWhatIsMeasuredInRadii)
 {
   Random random;
   const PatchType type{SurfaceType::EllipticParaboloid, BoundaryType::Ellipse};
-  const Fit fit = fitTo(test::robotSample(type, 1.0, random), type);
+  Fit fit = fitTo(test::robotSample(type, 1.0, random), type);
+  fit.batch.channel(PointBatch::Z)[0] += 0.05; // an obstacle: a dozen sigmas
   constexpr double kRadius = 0.1;
   const Validation measured = validate(fit.result, fit.batch, kNone, kRadius);
   EXPECT_EQ(measured.verdict, PatchVerdict::Accepted);
@@ -254,16 +255,55 @@ TEST(Verdicts, OnWhatIsMeasuredInRadii)
               measured.curvature_per_m * kRadius,
               PatchVerdict::CurvatureTooLarge);
   expectLimit(&ValidationOptions::max_departure,
-              measured.residual.largest_m / kRadius,
+              measured.residual.unexplained_m / kRadius,
               PatchVerdict::DepartureTooLarge);
+  expectLimit(&ValidationOptions::max_noise,
+              measured.noise_m / kRadius,
+              PatchVerdict::NoiseTooLarge);
   ValidationOptions options = kNone;
   options.max_view_angle_rad = 1.5;
-  const double angle = validate(fit.result, fit.batch, options).view_angle_rad;
+  EXPECT_FALSE(measured.view_angle_rad);
+  const double angle = validate(fit.result, fit.batch, options).view_angle_rad.value();
   const Eigen::Vector3d ray = fit.batch.viewpoint() - fit.result.patch.c;
   EXPECT_NEAR(std::cos(angle), fit.result.patch.normal().dot(ray.normalized()), 1e-12);
   expectLimit(&ValidationOptions::max_view_angle_rad,
               angle,
               PatchVerdict::NormalNotSeen);
+}
+
+// Noise that reaches beyond the limit of a departure is none, an obstacle is; and there
+// is noise that no patch of that radius stands.
+TEST(Verdicts, OnDeparturesAreAboutWhatNoiseDoesNotExplain)
+{
+  Random random;
+  constexpr double kRadius = 0.05;
+  const auto verdict = [&](double sigma, double obstacle) {
+    PointBatch batch;
+    batch.clear({0.0, 0.0, 2.5});
+    const Eigen::Vector3d variance(1e-8, 1e-8, sigma * sigma);
+    for (int i = 0; i < 400; ++i) {
+      const double angle = random.uniform(0.0, 6.283);
+      const double r = kRadius * std::sqrt(random.uniform(0.0, 1.0));
+      // Within what 400 points reach by chance.
+      const double noise = std::clamp(random.normal(), -3.5, 3.5) * sigma;
+      batch.add({r * std::cos(angle), r * std::sin(angle), 2.5 + noise},
+                variance.asDiagonal());
+    }
+    batch.add({0.0, 0.0, 2.5 - obstacle}, variance.asDiagonal());
+    FitOptions options;
+    options.surface = SurfaceRequest::Plane;
+    const FitResult fit = estimatePatch(batch, options);
+    EXPECT_TRUE(isUsable(fit.status));
+    return validate(fit, batch, ValidationOptions(), kRadius).verdict;
+  };
+  for (const double sigma : {0.002, 0.01, 0.03}) {
+    EXPECT_EQ(verdict(sigma, 0.0), PatchVerdict::Accepted) << sigma;
+    EXPECT_EQ(verdict(sigma, 0.3 * kRadius), PatchVerdict::Accepted) << sigma;
+    EXPECT_EQ(verdict(sigma, 0.36 * kRadius + 4.5 * sigma),
+              PatchVerdict::DepartureTooLarge)
+        << sigma;
+  }
+  EXPECT_EQ(verdict(0.04, 0.0), PatchVerdict::NoiseTooLarge);
 }
 
 TEST(ValidationOptionsCheck, NamesWhatIsWrong)
@@ -287,6 +327,7 @@ TEST(ValidationOptionsCheck, NamesWhatIsWrong)
     expectError(&ValidationOptions::max_sagitta, bad, "max_sagitta");
     expectError(&ValidationOptions::max_bend, bad, "max_bend");
     expectError(&ValidationOptions::max_departure, bad, "max_departure");
+    expectError(&ValidationOptions::max_noise, bad, "max_noise");
     expectError(&ValidationOptions::max_stray, bad, "max_stray");
     expectError(&ValidationOptions::max_view_angle_rad, bad, "max_view_angle_rad");
   }

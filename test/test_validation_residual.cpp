@@ -148,6 +148,39 @@ TEST_P(SurfaceDistance, ResidualIsTheRootMeanSquare)
   }
 }
 
+// Points are unexplained beyond four of their sigmas along the normal, whatever their
+// noise is across it.
+TEST_P(SurfaceDistance, WhatNoiseExplainsIsToldFromTheRest)
+{
+  for (std::uint64_t i = 0; i < kCases; ++i) {
+    Random random(i);
+    const Patch patch = randomPatch(random, GetParam());
+    const double radius = 1.0 / std::max(largestCurvature(patch), 1.0);
+    const Eigen::Vector3d n = patch.normal();
+    PointBatch batch;
+    batch.clear(patch.c);
+    std::vector<Eigen::Vector3d> points;
+    double unexplained = 0.0;
+    for (int k = 0; k < 100; ++k) {
+      const double distance = random.uniform(0.001, 0.05) * radius;
+      const double sigma = random.uniform(0.001, 0.05) * radius;
+      points.push_back(displacedPoint(random, patch, random.sign() * distance));
+      const double across = random.uniform(0.0, 0.1) * radius;
+      batch.add(points.back(),
+                sigma * sigma * n * n.transpose() +
+                    across * across *
+                        (Eigen::Matrix3d::Identity() - n * n.transpose()));
+      if (distance > kNoiseSigmas * sigma)
+        unexplained = std::max(unexplained, distance);
+    }
+    EXPECT_NEAR(measureResidual(patch, batch).unexplained_m,
+                unexplained,
+                1e-3 * unexplained);
+    const SurfaceResidual without = measureResidual(patch, points);
+    EXPECT_EQ(without.unexplained_m, without.largest_m);
+  }
+}
+
 TEST_P(SurfaceDistance, BatchAndListAgreeAndSkipWhatIsNotFinite)
 {
   Random random;

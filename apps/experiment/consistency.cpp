@@ -1,4 +1,5 @@
 // Are the covariances right? Every scene, type and mode against Monte Carlo.
+#include "cloud_limits.h"
 #include "consistency_rows.h"
 #include "experiment.h"
 #include "scene.h"
@@ -64,6 +65,7 @@ struct ConsistencyChoice {
   double noise_scale = 1.0;
   std::string sensor; // empty: the paper's Kinect
   bool no_pattern = false;
+  bool by_limits = false;
 };
 
 // "random": a distance, tilt and azimuth of its own for every type and seed.
@@ -255,25 +257,82 @@ addPatchRows(const std::vector<Case>& cases,
   describePatches(settings.trials, !patchSensor(choice).pattern.empty(), report);
 }
 
+Json
+cloudRow(const std::string& scene, const Case& one, const Json& measured)
+{
+  Json row = {{"scene", scene},
+              {"type", measured["type"]},
+              {"mode", covarianceModeName(one.mode)},
+              {"options", one.options.name}};
+  row.update(measured);
+  return row;
+}
+
 void
-addCloudRows(const std::string& scene,
-             const Case& one,
+addCloudRows(const Case& one,
              const std::vector<CloudCheck>& checks,
              const ConsistencyChoice& choice,
              Report& report)
 {
   for (const CloudCheck& check : checks)
-    for (const Json& of_type : rowsOf(check)) {
-      if (!choice.types.empty() && !chosen(choice.types, of_type["type"]))
-        continue;
-      Json row = {{"scene", scene},
-                  {"type", of_type["type"]},
-                  {"mode", covarianceModeName(one.mode)},
-                  {"options", one.options.name}};
-      row.update(of_type);
-      report.rows.push_back(std::move(row));
-    }
+    for (const Json& of_type : rowsOf(check))
+      if (choice.types.empty() || chosen(choice.types, of_type["type"]))
+        report.rows.push_back(cloudRow(one.scene, one, of_type));
 }
+
+// Every limit at several values, in the order of limitSets(), for each radius.
+void
+addLimitRows(const std::string& scene,
+             const Case& one,
+             const std::vector<CloudCheck>& checks,
+             std::vector<Json>& rows)
+{
+  const std::vector<LimitSet> sets = limitSets();
+  for (std::size_t i = 0; i < checks.size(); ++i)
+    rows.push_back(cloudRow(scene, one, limitRow(sets[i % sets.size()], checks[i])));
+}
+
+CloudCheckOptions
+cloudOptions(const Case& one, const ConsistencyChoice& choice)
+{
+  CloudCheckOptions options;
+  options.scene = one.scene;
+  options.fit = one.options.fit;
+  options.mode = one.mode;
+  if (choice.by_limits)
+    options.limits = optionsOf(limitSets());
+  return options;
+}
+
+// All scenes of one mode and one set of options together.
+class PooledClouds {
+public:
+  void add(const Case& one, const std::vector<CloudCheck>& checks)
+  {
+    const auto found =
+        std::find_if(pools_.begin(), pools_.end(), [&one](const Pool& pool) {
+          return pool.of.mode == one.mode && pool.of.options.name == one.options.name;
+        });
+    Pool& pool = found != pools_.end() ? *found : pools_.emplace_back(Pool{one, {}});
+    pool.checks.resize(checks.size());
+    for (std::size_t i = 0; i < checks.size(); ++i)
+      addTo(pool.checks[i], checks[i]);
+  }
+
+  void addRowsTo(std::vector<Json>& rows) const
+  {
+    for (const Pool& pool : pools_)
+      addLimitRows("all", pool.of, pool.checks, rows);
+  }
+
+private:
+  struct Pool {
+    Case of;
+    std::vector<CloudCheck> checks;
+  };
+
+  std::vector<Pool> pools_;
+};
 
 void
 checkCloudScenes(const std::vector<Case>& cases,
@@ -284,24 +343,29 @@ checkCloudScenes(const std::vector<Case>& cases,
   if (cases.empty())
     return;
   const Sensor sensor = cloudSensor(choice);
+  PooledClouds pooled;
   for (std::size_t i = 0; i < cases.size(); ++i) {
-    CloudCheckOptions options;
-    options.scene = cases[i].scene;
-    options.fit = cases[i].options.fit;
-    options.mode = cases[i].mode;
+    CloudCheckOptions options = cloudOptions(cases[i], choice);
     options.frames = std::max(1, settings.trials / kTrialsPerFrame);
     options.seed = settings.seed;
     options.threads = settings.threads;
     options.progress = stageProgress(settings.progress,
                                      static_cast<int>(i),
                                      static_cast<int>(cases.size()));
-    addCloudRows(cases[i].scene,
-                 cases[i],
-                 checkClouds(kCloudRadii_m, sensor, options),
-                 choice,
-                 report);
+    const std::vector<CloudCheck> checks = checkClouds(kCloudRadii_m, sensor, options);
+    if (choice.by_limits) {
+      addLimitRows(cases[i].scene, cases[i], checks, report.rows);
+      pooled.add(cases[i], checks);
+    }
+    else {
+      addCloudRows(cases[i], checks, choice, report);
+    }
   }
-  describeClouds(report);
+  if (!choice.by_limits)
+    return describeClouds(report);
+  pooled.addRowsTo(report.summary);
+  report.rows.insert(report.rows.begin(), report.summary.begin(), report.summary.end());
+  describeLimits(report);
 }
 
 Report
@@ -310,6 +374,10 @@ runConsistency(const ConsistencyChoice& choice, const ExperimentSettings& settin
   const std::vector<Case> patches = casesOf(choice), clouds = cloudCasesOf(choice);
   if (!clouds.empty() && choice.noise_scale != 1.0)
     throw CLI::ValidationError("--noise-scale", "goes with scenes of one patch only");
+  if (choice.by_limits && (!patches.empty() || !choice.types.empty()))
+    throw CLI::ValidationError("--limits",
+                               "goes with whole clouds (--scene rocks, table, stairs, "
+                               "mix) of all types only");
   Report report;
   report.columns = {{"scene", "scene"},
                     {"type", "type"},
@@ -348,6 +416,10 @@ addChoices(CLI::App& command, ConsistencyChoice& choice)
       scenes,
       "Only these scenes (default: all of one patch, the first seven)");
   add("--options", choice.options, options, "Option sets (default: default)");
+  command.add_flag("--limits",
+                   choice.by_limits,
+                   "Of whole clouds: the accepted patches by the limits of acceptance, "
+                   "each in turn tightened, loosened and off");
   command.add_flag_callback(
       "--paper",
       [&choice] { choice.options = {"paper"}; },

@@ -58,6 +58,22 @@ columnsText(const std::vector<ConsistencyColumn>& columns)
   return text;
 }
 
+// Of the state, as checks of one patch and of whole clouds have it.
+const std::vector<Column> kStateColumns{{"state NEES/dof", "state_nees_per_dof"},
+                                        {"state 95 %", "state_coverage95"},
+                                        {"no flag", "unflagged_state_nees_per_dof"},
+                                        {"95 %", "unflagged_state_coverage95"},
+                                        {"flag", "flagged_state_nees_per_dof"},
+                                        {"95 %", "flagged_state_coverage95"},
+                                        {"surface", "surface_nees_per_dof"},
+                                        {"95 %", "surface_coverage95"}};
+
+void
+addColumns(const std::vector<Column>& columns, Report& report)
+{
+  report.columns.insert(report.columns.end(), columns.begin(), columns.end());
+}
+
 } // namespace
 
 Json
@@ -129,26 +145,19 @@ columnRemarks(const CaseName& name, const ConsistencyResult& result)
 void
 describePatches(int trials, bool shared_errors, Report& report)
 {
-  report.columns.insert(report.columns.end(),
-                        {{"N", "points"},
-                         {"state NEES/dof", "state_nees_per_dof"},
-                         {"state 95 %", "state_coverage95"},
-                         {"no flag", "unflagged_state_nees_per_dof"},
-                         {"95 %", "unflagged_state_coverage95"},
-                         {"flag", "flagged_state_nees_per_dof"},
-                         {"95 %", "flagged_state_coverage95"},
-                         {"surface", "surface_nees_per_dof"},
-                         {"95 %", "surface_coverage95"},
-                         {"unflagged", "unflagged_nees_per_dof"},
-                         {"share", "unflagged_rate"},
-                         {"NEES/dof", "nees_per_dof"},
-                         {"about mean", "nees_per_dof_about_mean"},
-                         {"95 %", "coverage95"},
-                         {"sigma min", "sigma_ratio_min"},
-                         {"sigma max", "sigma_ratio_max"},
-                         {"bias", "bias_after_shift_max"},
-                         {"type errors", "type_error_rate"},
-                         {"failures", "failure_rate"}});
+  addColumns({{"N", "points"}}, report);
+  addColumns(kStateColumns, report);
+  addColumns({{"unflagged", "unflagged_nees_per_dof"},
+              {"share", "unflagged_rate"},
+              {"NEES/dof", "nees_per_dof"},
+              {"about mean", "nees_per_dof_about_mean"},
+              {"95 %", "coverage95"},
+              {"sigma min", "sigma_ratio_min"},
+              {"sigma max", "sigma_ratio_max"},
+              {"bias", "bias_after_shift_max"},
+              {"type errors", "type_error_rate"},
+              {"failures", "failure_rate"}},
+             report);
   report.remarks.push_back(
       "NEES/dof: squared error about the noise-free fit, normalised by the predicted "
       "covariance; 1 is right, and a Monte Carlo of this size gives it to about +-" +
@@ -169,29 +178,23 @@ describePatches(int trials, bool shared_errors, Report& report)
 void
 describeClouds(Report& report)
 {
-  report.columns.insert(report.columns.end(),
-                        {{"radius", "radius_m"},
-                         {"frames", "trials"},
-                         {"N", "points"},
-                         {"judged", "patches"},
-                         {"far", "far"},
-                         {"state NEES/dof", "state_nees_per_dof"},
-                         {"state 95 %", "state_coverage95"},
-                         {"no flag", "unflagged_state_nees_per_dof"},
-                         {"95 %", "unflagged_state_coverage95"},
-                         {"flag", "flagged_state_nees_per_dof"},
-                         {"95 %", "flagged_state_coverage95"},
-                         {"surface", "surface_nees_per_dof"},
-                         {"95 %", "surface_coverage95"},
-                         {"unflagged", "unflagged_nees_per_dof"},
-                         {"95 %", "unflagged_coverage95"},
-                         {"flagged", "flagged"},
-                         {"switched", "switch_rate"},
-                         {"other type", "other_type"},
-                         {"no reference", "no_reference"},
-                         {"failures", "failure_rate"},
-                         {"over an edge", "over_edge"},
-                         {"covered", "covered"}});
+  addColumns({{"radius", "radius_m"},
+              {"frames", "trials"},
+              {"N", "points"},
+              {"judged", "patches"},
+              {"far", "far"}},
+             report);
+  addColumns(kStateColumns, report);
+  addColumns({{"unflagged", "unflagged_nees_per_dof"},
+              {"95 %", "unflagged_coverage95"},
+              {"flagged", "flagged"},
+              {"switched", "switch_rate"},
+              {"other type", "other_type"},
+              {"no reference", "no_reference"},
+              {"failures", "failure_rate"},
+              {"over an edge", "over_edge"},
+              {"covered", "covered"}},
+             report);
   report.remarks.push_back(
       "Whole clouds: every accepted patch about the fit to the same pixels without "
       "noise, under the same covariances. far: those more than ten sigmas off, at "

@@ -1,7 +1,10 @@
 #include "scene.h"
 
+#include <holdfast/geometry/constants.h>
 #include <holdfast/sensor/stereo_noise_model.h>
+#include <holdfast/simulation/scene.h>
 
+#include <cmath>
 #include <memory>
 
 namespace holdfast::app {
@@ -19,6 +22,28 @@ NoiseModel::ConstPtr
 kinectNoise()
 {
   return std::make_shared<StereoNoiseModel>(StereoNoiseModel::Parameters{});
+}
+
+Scene
+randomView(const std::string& name, std::mt19937_64& generator, double spread_m)
+{
+  const auto uniform = [&](double low, double high) {
+    return low + (high - low) * std::generate_canonical<double, 53>(generator);
+  };
+  const double distance = uniform(1.0, 1.2);
+  const double azimuth = uniform(0.0, 2.0 * kPi), elevation = uniform(0.52, 1.1);
+  Scene scene = makeScene(name, distance);
+  Eigen::Vector3d middle = scene.sensor_pose.toWorld({0.0, 0.0, distance});
+  if (spread_m > 0.0) {
+    middle.x() += uniform(-spread_m, spread_m);
+    middle.y() += uniform(-spread_m, spread_m);
+  }
+  const Eigen::Vector3d direction(std::cos(elevation) * std::cos(azimuth),
+                                  std::cos(elevation) * std::sin(azimuth),
+                                  std::sin(elevation));
+  scene.sensor_pose =
+      lookAt(middle + distance * direction, middle, Eigen::Vector3d::UnitZ());
+  return scene;
 }
 
 PointBatch

@@ -9,6 +9,7 @@
 #include <holdfast/simulation/simulator.h>
 
 #include <array>
+#include <random>
 #include <string>
 
 namespace holdfast::app {
@@ -18,6 +19,12 @@ std::string typeName(PatchType type);
 
 /// The noise of the paper's Kinect: 0.35 px, 0.17 px of disparity, f = 580 px.
 NoiseModel::ConstPtr kinectNoise();
+
+/// The scene of makeScene() as a camera sees it that looks at its middle, or up to
+/// spread_m beside it, from 1.0 to 1.2 m, any side and 30 to 63 degrees above.
+Scene randomView(const std::string& name,
+                 std::mt19937_64& generator,
+                 double spread_m = 0.0);
 
 /// The points without noise of those pixels that see the scene's first patch, with the
 /// covariances of the noise they would have.

@@ -48,12 +48,14 @@ windowOf(const RangeImage& image, const Camera& camera, const Patch& patch)
       range(camera.fy * c.y() / c.z() + camera.cy, camera.fy * reach, image.height)};
 }
 
-/// Marks the pixels that lie on the patch. \return true when it leaves the surface.
+/// Calls visit(pixel, whether what is there agrees) for the pixels that see the patch.
+/// \return true when too many do not agree.
+template <typename Visit>
 bool
-isOverEdge(const RangeImage& image,
-           const Camera& camera,
-           const Patch& patch,
-           std::vector<bool>& is_covered)
+visitPixels(const RangeImage& image,
+            const Camera& camera,
+            const Patch& patch,
+            Visit&& visit)
 {
   constexpr double kShare = 0.05;
   const PixelWindow window = windowOf(image, camera, patch);
@@ -65,11 +67,10 @@ isOverEdge(const RangeImage& image,
       const auto t = intersectRay(patch, image.sensor_pose.c, ray);
       if (!t)
         continue;
+      const bool agreed = agrees(image, pixel, patch, image.sensor_pose.c + *t * ray);
       ++seen;
-      if (agrees(image, pixel, patch, image.sensor_pose.c + *t * ray))
-        is_covered[pixel] = true;
-      else
-        ++left;
+      left += agreed ? 0 : 1;
+      visit(pixel, agreed);
     }
   return left > kShare * seen;
 }
@@ -134,40 +135,35 @@ private:
 
 } // namespace
 
-TruthTally&
-operator+=(TruthTally& all, const TruthTally& one)
+TruthCheck::TruthCheck(const RangeImage& image, const Sensor& sensor, double radius_m)
+: image_(image), camera_(sensor.camera), sample_of_(image.truth.size(), -1)
 {
-  all.patches += one.patches;
-  all.over_edge += one.over_edge;
-  all.smooth_pixels += one.smooth_pixels;
-  all.covered_pixels += one.covered_pixels;
-  return all;
-}
-
-TruthTally
-compareWithTruth(const RangeImage& image,
-                 const Sensor& sensor,
-                 const std::vector<ExtractedPatch>& patches,
-                 double radius_m)
-{
-  TruthTally tally;
-  std::vector<bool> is_covered(image.truth.size(), false);
-  for (const ExtractedPatch& patch : patches) {
-    ++tally.patches;
-    tally.over_edge +=
-        isOverEdge(image, sensor.camera, patch.fit.patch, is_covered) ? 1 : 0;
-  }
   constexpr int kStep = 8;
   SmoothSurface surface(image, sensor, radius_m);
   for (int v = kStep / 2; v < image.height; v += kStep)
     for (int u = kStep / 2; u < image.width; u += kStep) {
       const int pixel = v * image.width + u;
-      if (!surface.isSmoothAt(pixel))
-        continue;
-      ++tally.smooth_pixels;
-      tally.covered_pixels += is_covered[static_cast<std::size_t>(pixel)] ? 1 : 0;
+      if (surface.isSmoothAt(pixel))
+        sample_of_[static_cast<std::size_t>(pixel)] = smooth_samples_++;
     }
-  return tally;
+}
+
+PatchTruth
+TruthCheck::check(const Patch& patch) const
+{
+  PatchTruth truth;
+  truth.over_edge =
+      visitPixels(image_, camera_, patch, [&](std::size_t pixel, bool agreed) {
+        if (agreed && sample_of_[pixel] >= 0)
+          truth.covered.push_back(sample_of_[pixel]);
+      });
+  return truth;
+}
+
+bool
+leavesTrueSurface(const RangeImage& image, const Camera& camera, const Patch& patch)
+{
+  return visitPixels(image, camera, patch, [](std::size_t, bool) {});
 }
 
 } // namespace holdfast::app

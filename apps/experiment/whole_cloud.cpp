@@ -2,6 +2,7 @@
 
 #include "consistency_rows.h"
 #include "scene.h"
+#include "truth_check.h"
 
 #include <holdfast/geometry/constants.h>
 #include <holdfast/geometry/rotation.h>
@@ -22,25 +23,6 @@
 namespace holdfast::app {
 namespace {
 
-/// The scene as a camera sees it that looks at its middle from somewhere.
-Scene
-viewOf(const std::string& name, std::mt19937_64& generator)
-{
-  const auto uniform = [&](double low, double high) {
-    return low + (high - low) * std::generate_canonical<double, 53>(generator);
-  };
-  const double distance = uniform(1.0, 1.2);
-  const double azimuth = uniform(0.0, 2.0 * kPi), elevation = uniform(0.52, 1.1);
-  Scene scene = makeScene(name, distance);
-  const Eigen::Vector3d middle = scene.sensor_pose.toWorld({0.0, 0.0, distance});
-  const Eigen::Vector3d direction(std::cos(elevation) * std::cos(azimuth),
-                                  std::cos(elevation) * std::sin(azimuth),
-                                  std::sin(elevation));
-  scene.sensor_pose =
-      lookAt(middle + distance * direction, middle, Eigen::Vector3d::UnitZ());
-  return scene;
-}
-
 /// The noise-free fits of one frame.
 class Referee {
 public:
@@ -57,9 +39,9 @@ public:
   {}
 
   /// Of the pixels of a patch.
-  FitResult fitFor(const ExtractedPatch& patch)
+  FitResult fitFor(const ExtractedPatch& patch, bool is_second_attempt)
   {
-    if (patch.is_second_attempt)
+    if (is_second_attempt)
       sampler_.strictNeighborhood(patch.seed_index.value(), *scratch_, indices_);
     else
       sampler_.neighborhood(patch.seed_index.value(), *scratch_, indices_);
@@ -161,65 +143,6 @@ judge(const FitResult& fit, const FitResult& reference, CloudTally& tally)
   tally.points += fit.points;
 }
 
-int
-indexOf(PatchType type)
-{
-  return static_cast<int>(std::find(kPatchTypes.begin(), kPatchTypes.end(), type) -
-                          kPatchTypes.begin());
-}
-
-CloudCheck
-checkFrame(const RangeImage& image,
-           const RangeCloud& cloud,
-           const Sensor& sensor,
-           const ExtractionOptions& options)
-{
-  const ExtractionResult result = extractPatches(cloud, sensor, options);
-  Referee referee(image, cloud, sensor, options);
-  CloudCheck check;
-  check.radius_m = options.sampler.radius_m;
-  check.frames = 1;
-  for (const auto& [status, count] : result.rejected)
-    check.failures += count;
-  for (const auto& [verdict, count] : result.turned_down)
-    check.failures += count;
-  check.seeds = static_cast<int>(result.patches.size()) + check.failures;
-  check.truth =
-      compareWithTruth(image, sensor, result.patches, options.sampler.radius_m);
-  for (const ExtractedPatch& patch : result.patches)
-    judge(patch.fit, referee.fitFor(patch), check.types[indexOf(patch.fit.patch.type)]);
-  return check;
-}
-
-/// One frame at every radius.
-std::vector<CloudCheck>
-checkFrames(int frame,
-            const std::vector<double>& radii_m,
-            const Sensor& sensor,
-            const CloudCheckOptions& options)
-{
-  std::mt19937_64 generator =
-      trialGenerator(options.seed, static_cast<std::uint64_t>(frame));
-  const RangeImage image = simulate(viewOf(options.scene, generator),
-                                    pixelRays(sensor.camera),
-                                    sensor,
-                                    {},
-                                    generator);
-  RangeCloud cloud = cloudOf(image);
-  cloud.sensor_pose_given = true;
-  ExtractionOptions extraction;
-  extraction.fit = options.fit;
-  extraction.covariance = options.mode;
-  extraction.validation.emplace();
-  extraction.threads = 1;
-  std::vector<CloudCheck> checks;
-  for (const double radius : radii_m) {
-    extraction.sampler.radius_m = radius;
-    checks.push_back(checkFrame(image, cloud, sensor, extraction));
-  }
-  return checks;
-}
-
 void
 addTo(CloudTally& all, const CloudTally& one)
 {
@@ -235,16 +158,211 @@ addTo(CloudTally& all, const CloudTally& one)
   all.points += one.points;
 }
 
-void
-addTo(CloudCheck& all, const CloudCheck& one)
+int
+indexOf(PatchType type)
 {
-  all.radius_m = one.radius_m;
-  all.frames += one.frames;
-  all.seeds += one.seeds;
-  all.failures += one.failures;
-  all.truth += one.truth;
-  for (const auto& [type, tally] : one.types)
-    addTo(all.types[type], tally);
+  return static_cast<int>(std::find(kPatchTypes.begin(), kPatchTypes.end(), type) -
+                          kPatchTypes.begin());
+}
+
+/// Everything is measured, nothing turned down.
+ValidationOptions
+measuringAll()
+{
+  ValidationOptions options = ValidationOptions::withoutLimits();
+  options.max_stray = 1.0;
+  options.max_view_angle_rad = kPi;
+  return options;
+}
+
+/// What came of a seed: the patch of its neighbourhood, and where any of the limits
+/// asked for one, the patch of the part that is one surface with it.
+struct Attempts {
+  ExtractedPatch first;
+  std::optional<ExtractedPatch> second;
+};
+
+/// The road of `holdfast fit` under several limits at once.
+class FrameAttempts {
+public:
+  FrameAttempts(const RangeCloud& cloud,
+                const Sensor& sensor,
+                ExtractionOptions options,
+                const std::vector<ValidationOptions>& limits)
+  : limits_(limits), radius_m_(options.sampler.radius_m)
+  {
+    options.validation = measuringAll();
+    options.keep_failures = true;
+    for (ExtractedPatch& patch : extractPatches(cloud, sensor, options).patches)
+      seeds_.push_back({std::move(patch), std::nullopt});
+    addSecondAttempts(cloud, sensor, options);
+  }
+
+  const std::vector<Attempts>& seeds() const
+  {
+    return seeds_;
+  }
+
+  bool accepts(std::size_t limits, const ExtractedPatch& patch) const
+  {
+    return verdict(limits, patch) == PatchVerdict::Accepted;
+  }
+
+  /// What is not seen in the whole is not seen in a part, and a part has its noise.
+  bool triesAgain(std::size_t limits, const ExtractedPatch& first) const
+  {
+    const PatchVerdict said = verdict(limits, first);
+    return isUsable(first.fit.status) && said != PatchVerdict::Accepted &&
+           said != PatchVerdict::NormalNotSeen && said != PatchVerdict::NoiseTooLarge;
+  }
+
+private:
+  PatchVerdict verdict(std::size_t limits, const ExtractedPatch& patch) const
+  {
+    return verdictOf(*patch.validation, limits_[limits], radius_m_);
+  }
+
+  bool anyTriesAgain(const ExtractedPatch& first) const
+  {
+    for (std::size_t i = 0; i < limits_.size(); ++i)
+      if (triesAgain(i, first))
+        return true;
+    return false;
+  }
+
+  void addSecondAttempts(const RangeCloud& cloud,
+                         const Sensor& sensor,
+                         const ExtractionOptions& options)
+  {
+    const PointSelection chosen = selectPoints(cloud, sensor);
+    const NeighborhoodSampler sampler(chosen.cloud, chosen.sensor, options.sampler);
+    const auto scratch = sampler.makeScratch();
+    std::vector<Attempts*> waiting;
+    PatchSites sites;
+    sites.seeds.emplace();
+    for (Attempts& attempts : seeds_)
+      if (anyTriesAgain(attempts.first)) {
+        waiting.push_back(&attempts);
+        sites.seeds->push_back(
+            {attempts.first.seed_index.value(), attempts.first.seed});
+      }
+    sites.search = [&](const Seed& seed, int, std::vector<int>& indices) {
+      sampler.strictNeighborhood(seed.index, *scratch, indices);
+    };
+    std::vector<ExtractedPatch> patches =
+        extractPatches(cloud, sensor, options, sites).patches;
+    for (std::size_t i = 0; i < patches.size(); ++i) {
+      if (isUsable(patches[i].fit.status))
+        patches[i].validation->stray_share =
+            sampler.strayShare((*sites.seeds)[i].index, patches[i].fit.patch);
+      waiting[i]->second = std::move(patches[i]);
+    }
+  }
+
+  const std::vector<ValidationOptions>& limits_;
+  double radius_m_;
+  std::vector<Attempts> seeds_;
+};
+
+/// One frame at one radius.
+class FrameCheck {
+public:
+  FrameCheck(const RangeImage& image,
+             const RangeCloud& cloud,
+             const Sensor& sensor,
+             const ExtractionOptions& options,
+             const std::vector<ValidationOptions>& limits)
+  : attempts_(cloud, sensor, options, limits)
+  , referee_(image, cloud, sensor, options)
+  , truth_(image, sensor, options.sampler.radius_m)
+  , checks_(limits.size())
+  , covered_(limits.size(),
+             std::vector<bool>(static_cast<std::size_t>(truth_.smoothSamples())))
+  {
+    for (CloudCheck& check : checks_) {
+      check.radius_m = options.sampler.radius_m;
+      check.frames = 1;
+      check.seeds = static_cast<int>(attempts_.seeds().size());
+      check.smooth_samples = truth_.smoothSamples();
+    }
+  }
+
+  std::vector<CloudCheck> run()
+  {
+    for (const Attempts& attempts : attempts_.seeds()) {
+      std::vector<std::size_t> first, second; // limits that accept it
+      for (std::size_t i = 0; i < checks_.size(); ++i) {
+        if (attempts_.accepts(i, attempts.first))
+          first.push_back(i);
+        else if (attempts.second && attempts_.triesAgain(i, attempts.first) &&
+                 attempts_.accepts(i, *attempts.second))
+          second.push_back(i);
+      }
+      add(attempts.first, false, first);
+      if (!second.empty())
+        add(*attempts.second, true, second);
+    }
+    for (std::size_t i = 0; i < checks_.size(); ++i)
+      checks_[i].covered_samples =
+          static_cast<int>(std::count(covered_[i].begin(), covered_[i].end(), true));
+    return std::move(checks_);
+  }
+
+private:
+  void add(const ExtractedPatch& patch,
+           bool is_second_attempt,
+           const std::vector<std::size_t>& accepted_by)
+  {
+    if (accepted_by.empty())
+      return;
+    CloudTally tally;
+    judge(patch.fit, referee_.fitFor(patch, is_second_attempt), tally);
+    const PatchTruth truth = truth_.check(patch.fit.patch);
+    for (const std::size_t i : accepted_by) {
+      CloudCheck& check = checks_[i];
+      ++check.accepted;
+      check.over_edge += truth.over_edge ? 1 : 0;
+      addTo(check.types[indexOf(patch.fit.patch.type)], tally);
+      for (const int sample : truth.covered)
+        covered_[i][static_cast<std::size_t>(sample)] = true;
+    }
+  }
+
+  FrameAttempts attempts_;
+  Referee referee_;
+  TruthCheck truth_;
+  std::vector<CloudCheck> checks_; ///< by limits
+  std::vector<std::vector<bool>> covered_;
+};
+
+/// One frame at every radius, under all limits.
+std::vector<CloudCheck>
+checkFrames(int frame,
+            const std::vector<double>& radii_m,
+            const Sensor& sensor,
+            const CloudCheckOptions& options)
+{
+  std::mt19937_64 generator =
+      trialGenerator(options.seed, static_cast<std::uint64_t>(frame));
+  const RangeImage image = simulate(randomView(options.scene, generator),
+                                    pixelRays(sensor.camera),
+                                    sensor,
+                                    {},
+                                    generator);
+  RangeCloud cloud = cloudOf(image);
+  cloud.sensor_pose_given = true;
+  ExtractionOptions extraction;
+  extraction.fit = options.fit;
+  extraction.covariance = options.mode;
+  extraction.threads = 1;
+  std::vector<CloudCheck> checks;
+  for (const double radius : radii_m) {
+    extraction.sampler.radius_m = radius;
+    const std::vector<CloudCheck> of_radius =
+        FrameCheck(image, cloud, sensor, extraction, options.limits).run();
+    checks.insert(checks.end(), of_radius.begin(), of_radius.end());
+  }
+  return checks;
 }
 
 Json
@@ -311,25 +429,45 @@ checkClouds(const std::vector<double>& radii_m,
             checkFrames(frame, radii_m, sensor, options);
       },
       options.progress);
-  std::vector<CloudCheck> checks(radii_m.size());
+  std::vector<CloudCheck> checks(radii_m.size() * options.limits.size());
   for (const std::vector<CloudCheck>& frame : frames)
     for (std::size_t i = 0; i < checks.size(); ++i)
       addTo(checks[i], frame[i]);
   return checks;
 }
 
-std::vector<Json>
-rowsOf(const CloudCheck& check)
+void
+addTo(CloudCheck& all, const CloudCheck& one)
+{
+  all.radius_m = one.radius_m;
+  all.frames += one.frames;
+  all.seeds += one.seeds;
+  all.accepted += one.accepted;
+  all.over_edge += one.over_edge;
+  all.smooth_samples += one.smooth_samples;
+  all.covered_samples += one.covered_samples;
+  for (const auto& [type, tally] : one.types)
+    addTo(all.types[type], tally);
+}
+
+Json
+summaryOf(const CloudCheck& check)
 {
   CloudTally all;
   for (const auto& [type, tally] : check.types)
     addTo(all, tally);
-  std::vector<Json> rows{rowOf(check, "all", all)};
-  rows.front()["seeds"] = check.seeds;
-  rows.front()["failure_rate"] = share(check.failures, check.seeds);
-  const TruthTally& truth = check.truth;
-  rows.front()["over_edge"] = share(truth.over_edge, truth.patches);
-  rows.front()["covered"] = share(truth.covered_pixels, truth.smooth_pixels);
+  Json row = rowOf(check, "all", all);
+  row["seeds"] = check.seeds;
+  row["failure_rate"] = share(check.seeds - check.accepted, check.seeds);
+  row["over_edge"] = share(check.over_edge, check.accepted);
+  row["covered"] = share(check.covered_samples, check.smooth_samples);
+  return row;
+}
+
+std::vector<Json>
+rowsOf(const CloudCheck& check)
+{
+  std::vector<Json> rows{summaryOf(check)};
   for (const auto& [type, tally] : check.types)
     rows.push_back(
         rowOf(check, typeName(kPatchTypes[static_cast<std::size_t>(type)]), tally));

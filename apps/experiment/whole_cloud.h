@@ -3,12 +3,11 @@
 #pragma once
 
 #include "experiment.h"
-#include "truth_check.h"
-
 #include <holdfast/evaluation/consistency.h>
 #include <holdfast/fit/options.h>
 #include <holdfast/sensor/sensor.h>
 #include <holdfast/uncertainty/covariance_mode.h>
+#include <holdfast/validation/checks.h>
 
 #include <map>
 #include <vector>
@@ -35,13 +34,15 @@ struct CloudTally {
   long long points = 0; ///< of the patches judged
 };
 
-/// What became of the seeds of all frames at one radius.
+/// What became of the seeds of all frames at one radius, under one set of limits.
 struct CloudCheck {
   double radius_m = 0.0;
   int frames = 0;
   int seeds = 0;
-  int failures = 0; ///< seeds without an accepted patch
-  TruthTally truth; ///< of the accepted ones against the true surface
+  int accepted = 0; ///< seeds with an accepted patch
+  int over_edge = 0; ///< of the accepted patches leave the true surface
+  int smooth_samples = 0; ///< of the true surface
+  int covered_samples = 0; ///< of them lie on an accepted patch
   std::map<int, CloudTally> types; ///< by index in kPatchTypes
 };
 
@@ -49,6 +50,8 @@ struct CloudCheckOptions {
   std::string scene; ///< of makeScene()
   FitOptions fit;
   CovarianceMode mode = CovarianceMode::Exact;
+  /// What is accepted: each of these sees the same fits.
+  std::vector<ValidationOptions> limits{ValidationOptions()};
   int frames = 10;
   std::uint64_t seed = 1;
   int threads = 0; ///< 0: all cores; the result does not depend on it
@@ -59,10 +62,16 @@ struct CloudCheckOptions {
 /// noise and pattern of the sensor, go the road of `holdfast fit`. Each accepted patch
 /// is compared with the fit to the same pixels without noise, under the covariances
 /// that the noisy points have.
-/// \return one check for each radius, metres, of the same frames.
+/// \return of the same frames, for each radius (metres) one check for each of the
+/// limits.
 std::vector<CloudCheck> checkClouds(const std::vector<double>& radii_m,
                                     const Sensor& sensor,
                                     const CloudCheckOptions& options);
+
+void addTo(CloudCheck& all, const CloudCheck& one);
+
+/// Of all types, without its name.
+Json summaryOf(const CloudCheck& check);
 
 /// A row for all types together and one for each there is.
 std::vector<Json> rowsOf(const CloudCheck& check);

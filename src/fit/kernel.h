@@ -161,12 +161,13 @@ struct PatchForm {
 };
 
 /// Of every point, padding included: its local coordinates, how far out they are
-/// (BoundaryForm), and its squared distance to the unbounded surface along the gradient
-/// at the point (validation/residual.h).
+/// (BoundaryForm), its squared distance to the unbounded surface along the gradient at
+/// the point (validation/residual.h), and the variance of its error along local z.
 struct PlacedPoints {
   double* q[3];
   double* reach;
   double* squared_distance;
+  double* variance;
 };
 
 /// A square grid of cells, row by row, with kCellRow numbers each.
@@ -227,7 +228,7 @@ struct Kernel {
                            const State& state,
                            double* out);
 
-  /// Where points lie about a patch; of the points only the coordinates are used.
+  /// Where points lie about a patch.
   void (*placePoints)(const Points& points,
                       const PatchForm& patch,
                       const PlacedPoints& out);

@@ -458,9 +458,19 @@ squaredDistance(const double k[3], const Number q[3])
   return t * t * hh;
 }
 
+// n^T S n.
+HOLDFAST_INLINE Number
+varianceAlong(const double n[3], const Number S[6])
+{
+  return S[0] * (n[0] * n[0]) + S[3] * (n[1] * n[1]) + S[5] * (n[2] * n[2]) +
+         S[1] * (2.0 * n[0] * n[1]) + S[2] * (2.0 * n[0] * n[2]) +
+         S[4] * (2.0 * n[1] * n[2]);
+}
+
 inline void
 placePoints(const Points& points, const PatchForm& patch, const PlacedPoints& out)
 {
+  const double normal[3] = {patch.R[2], patch.R[5], patch.R[8]};
   for (int i = 0; i < points.padded_size; i += kLanes) {
     Number offset[3], q[3];
     HOLDFAST_UNROLLED_FOR (int k = 0; k < 3; ++k)
@@ -470,6 +480,9 @@ placePoints(const Points& points, const PatchForm& patch, const PlacedPoints& ou
       store(q[k], out.q[k] + i);
     store(reachOf(patch.boundary, q[0], q[1]), out.reach + i);
     store(squaredDistance(patch.k, q), out.squared_distance + i);
+    Number S[6];
+    loadCovariance(points, i, S);
+    store(varianceAlong(normal, S), out.variance + i);
   }
 }
 

@@ -164,6 +164,23 @@ optionalJson(const std::optional<T>& value)
   return value ? Json(*value) : Json();
 }
 
+/// The verdict and what it is about, but for chi-square, which is the fit's.
+void
+writeMeasured(const Validation& validation, Json& patch)
+{
+  patch["verdict"] = verdictName(validation.verdict);
+  patch["residual"] = {{"rms", validation.residual.rms_m},
+                       {"largest", validation.residual.largest_m},
+                       {"unexplained", validation.residual.unexplained_m}};
+  patch["coverage"] = validation.coverage.share;
+  patch["measured"] = {{"extent", validation.extent_m},
+                       {"sagitta", validation.sagitta_m},
+                       {"curvature", validation.curvature_per_m},
+                       {"noise", validation.noise_m},
+                       {"view_angle", optionalJson(validation.view_angle_rad)},
+                       {"stray", optionalJson(validation.stray_share)}};
+}
+
 /// Null when patches were not even measured.
 Json
 validationJson(const std::optional<ValidationOptions>& validation)
@@ -174,6 +191,7 @@ validationJson(const std::optional<ValidationOptions>& validation)
           {"max_sagitta", optionalJson(validation->max_sagitta)},
           {"max_bend", optionalJson(validation->max_bend)},
           {"max_departure", optionalJson(validation->max_departure)},
+          {"max_noise", optionalJson(validation->max_noise)},
           {"max_stray", optionalJson(validation->max_stray)},
           {"max_view_angle", optionalJson(validation->max_view_angle_rad)},
           {"max_curvature", optionalJson(validation->max_curvature_per_m)},
@@ -258,15 +276,12 @@ patchJson(const ExtractedPatch& extracted, const PatchReport& report)
             {"verdict", Json()},
             {"residual", Json()},
             {"coverage", Json()},
+            {"measured", Json()},
             {"second_attempt", extracted.is_second_attempt},
             {"seed", seed},
             {"radius", extracted.radius_m > 0.0 ? Json(extracted.radius_m) : Json()}};
-  if (const auto& validation = extracted.validation) {
-    json["verdict"] = verdictName(validation->verdict);
-    json["residual"] = {{"rms", validation->residual.rms_m},
-                        {"largest", validation->residual.largest_m}};
-    json["coverage"] = validation->coverage.share;
-  }
+  if (extracted.validation)
+    writeMeasured(*extracted.validation, json);
   if (second_order) {
     json["mean_shift"] = vectorJson(fit.mean_shift);
     json["state_mean_shift"] = vectorJson(fit.state_mean_shift);
@@ -377,6 +392,37 @@ readNumbers(const Json& json, FitResult& fit)
   fit.patch = unpack(type, vector);
 }
 
+/// Files of former versions hold accepted patches alone, and not all that is measured.
+std::optional<Validation>
+readMeasured(const Json& json, const FitResult& fit)
+{
+  const Json& residual = json.at("residual");
+  if (residual.is_null())
+    return std::nullopt;
+  Validation validation;
+  const std::string verdict = json.value("verdict", "accepted");
+  validation.verdict = known(kVerdictNames.find(verdict), verdict);
+  validation.residual.rms_m = number(residual.at("rms"));
+  validation.residual.largest_m = number(residual.at("largest"));
+  validation.residual.unexplained_m =
+      number(residual.value("unexplained", Json(validation.residual.largest_m)));
+  validation.coverage.share = number(json.at("coverage"));
+  validation.chi2_per_dof = chi2PerDof(fit);
+  const Json measured = json.value("measured", Json());
+  if (measured.is_null())
+    return validation;
+  validation.extent_m = number(measured.at("extent"));
+  validation.sagitta_m = number(measured.at("sagitta"));
+  validation.curvature_per_m = number(measured.at("curvature"));
+  validation.noise_m = number(measured.at("noise"));
+  const auto optional = [](const Json& value) {
+    return value.is_null() ? std::nullopt : std::optional(value.get<double>());
+  };
+  validation.view_angle_rad = optional(measured.at("view_angle"));
+  validation.stray_share = optional(measured.at("stray"));
+  return validation;
+}
+
 /// Files of former versions have neither state nor flags: there the state is that of
 /// the parameters, and no covariance of it is known.
 void
@@ -437,15 +483,7 @@ patchFromJson(const Json& json, double containment)
   extracted.is_second_attempt = json.value("second_attempt", false);
   if (const Json& radius = json.at("radius"); !radius.is_null())
     extracted.radius_m = radius;
-  if (const Json& residual = json.at("residual"); !residual.is_null()) {
-    Validation& validation = extracted.validation.emplace();
-    // Files of former versions hold accepted patches alone.
-    const std::string verdict = json.value("verdict", "accepted");
-    validation.verdict = known(kVerdictNames.find(verdict), verdict);
-    validation.residual.rms_m = number(residual.at("rms"));
-    validation.residual.largest_m = number(residual.at("largest"));
-    validation.coverage.share = number(json.at("coverage"));
-  }
+  extracted.validation = readMeasured(json, fit);
   return extracted;
 }
 

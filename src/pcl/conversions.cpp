@@ -1,6 +1,7 @@
 #include <holdfast/pcl/conversions.h>
 
 #include <holdfast/fit/names.h>
+#include <holdfast/validation/names.h>
 
 #include "zero_points.h"
 
@@ -243,7 +244,7 @@ toExtractedPatch(const PatchPoint& point)
   const PatchType type{static_cast<SurfaceType>(point.surface),
                        static_cast<BoundaryType>(point.boundary)};
   if (!isLegal(type) || point.status > static_cast<int>(FitStatus::NonFinite) ||
-      point.verdict > static_cast<int>(PatchVerdict::ChiSquareTooLarge))
+      point.verdict >= kVerdictNames.words.size())
     throw std::invalid_argument(
         "holdfast::toExtractedPatch: no patch type, status or verdict");
   fit.status = static_cast<FitStatus>(point.status);

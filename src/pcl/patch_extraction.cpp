@@ -102,10 +102,10 @@ public:
     return patch;
   }
 
-  /// ValidationOptions::max_stray
-  std::optional<double> largestStray() const
+  /// As they hold for this cloud.
+  const std::optional<ValidationOptions>& limits() const
   {
-    return validation_ ? validation_->max_stray : std::nullopt;
+    return validation_;
   }
 
 private:
@@ -238,15 +238,14 @@ private:
 void
 checkStray(const Seed& seed,
            const CompleteSites& sites,
-           std::optional<double> limit,
+           const std::optional<ValidationOptions>& limits,
            ExtractedPatch& patch)
 {
-  if (!sites.stray_share || !limit || !isAccepted(patch))
+  if (!sites.stray_share || !limits || !limits->max_stray || !isAccepted(patch))
     return;
   Validation& validation = *patch.validation;
   validation.stray_share = sites.stray_share(seed, patch.fit.patch);
-  if (validation.stray_share > *limit)
-    validation.verdict = PatchVerdict::OverEdge;
+  validation.verdict = verdictOf(validation, *limits, patch.radius_m);
 }
 
 /// True when another part of the neighbourhood may be what was asked for.
@@ -254,7 +253,8 @@ bool
 deservesSecondAttempt(const ExtractedPatch& patch)
 {
   return isUsable(patch.fit.status) && !isAccepted(patch) &&
-         patch.validation->verdict != PatchVerdict::NormalNotSeen;
+         patch.validation->verdict != PatchVerdict::NormalNotSeen &&
+         patch.validation->verdict != PatchVerdict::NoiseTooLarge;
 }
 
 /// Working memory of one thread.
@@ -274,7 +274,7 @@ attemptAt(const Seed& seed,
   const auto fitted = [&] {
     ExtractedPatch patch =
         maker.make(work.indices, seed.position, sites.radius_m, work.batch);
-    checkStray(seed, sites, maker.largestStray(), patch);
+    checkStray(seed, sites, maker.limits(), patch);
     return patch;
   };
   sites.search(seed, thread, work.indices);

@@ -65,45 +65,129 @@ gain(const ByTheta& F_theta, const ThetaMatrix& inverse)
   return -F_theta.lazyProduct(inverse);
 }
 
-// Noise sums that the plane stage shares with the surface and the moments. The moments
-// are in the axes of the surface.
+// Noise sums of the plane stage's gradient, with itself, and with what it shares with
+// the surface and the moments. The moments are in the axes of the surface.
 struct PlaneStageSums {
+  ThetaMatrix own; // sum X_p Sigma X_p^T
   Eigen::Matrix<double, 6, 6> with_surface; // sum X_p Sigma X^T
   Eigen::Matrix<double, 6, 9> with_moments; // sum X_p Sigma D^T
 };
 
-PlaneStageSums
-planeStageSums(const PatchFit& fit, const PointBatch& batch, const FitOptions& options)
+// Both stages' gradients by the points, X of n and X_p of np rows, row by row for each
+// point and in the axes of each surface.
+struct StageGradients {
+  const std::vector<double>& X;
+  const std::vector<double>& Xp;
+  int n, np;
+
+  using Terms = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor, 6, 3>;
+
+  Eigen::Map<const Terms> surface(int i) const
+  {
+    return {X.data() + 3 * n * i, n, 3};
+  }
+  Eigen::Map<const Terms> plane(int i) const
+  {
+    return {Xp.data() + 3 * np * i, np, 3};
+  }
+};
+
+StageGradients
+stageGradients(const PatchFit& fit, const PointBatch& batch, Residual residual)
 {
-  const UnboundedSurface& surface = fit.surface.surface;
-  const UnboundedSurface& plane = fit.plane.surface;
-  const kernel::Points points = kernelPoints(batch);
   // Kept between patches: no allocation once they have seen the largest.
   thread_local std::vector<double> X, Xp;
-  kernel::crossTerms(surface.model,
-                     options.residual,
-                     points,
-                     kernelState(surface, fit.scatter),
-                     X);
-  kernel::crossTerms(plane.model,
-                     options.residual,
-                     points,
-                     kernelState(plane, fit.scatter),
-                     Xp);
-  const int n = kernel::parameterCount(surface.model);
-  const int np = kernel::parameterCount(plane.model);
-  using Terms = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor, 6, 3>;
+  const kernel::Points points = kernelPoints(batch);
+  const auto fill = [&](const UnboundedSurface& surface, std::vector<double>& terms) {
+    kernel::crossTerms(surface.model,
+                       residual,
+                       points,
+                       kernelState(surface, fit.scatter),
+                       terms);
+  };
+  fill(fit.surface.surface, X);
+  fill(fit.plane.surface, Xp);
+  return {X,
+          Xp,
+          kernel::parameterCount(fit.surface.surface.model),
+          kernel::parameterCount(fit.plane.surface.model)};
+}
+
+Eigen::Vector3d
+sharedDirection(const PointBatch& batch, int i)
+{
+  return {batch.channel(PointBatch::EX)[i],
+          batch.channel(PointBatch::EY)[i],
+          batch.channel(PointBatch::EZ)[i]};
+}
+
+// The covariance of a point that the sums count: with a pattern, its EXTRA beside it,
+// or, without the pattern, what is left of it.
+Eigen::Matrix3d
+countedCovariance(const PointBatch& batch, int i, bool with_pattern)
+{
+  Eigen::Matrix3d Sigma = batch.covariance(i);
+  if (batch.pattern() == nullptr)
+    return Sigma;
+  const Eigen::Vector3d r = sharedDirection(batch, i);
+  const double along =
+      with_pattern ? batch.channel(PointBatch::EXTRA)[i] : -batch.pattern()->variance();
+  return Sigma + along * r * r.transpose();
+}
+
+// The pairs of points that share errors. PatternSupport sums six rows of responses with
+// themselves and with the moments: here the plane's in front, and behind them those of
+// the surface, as many as there is room for, in turn.
+void
+addPatternOfPlaneStage(const PatchFit& fit,
+                       const PointBatch& batch,
+                       const StageGradients& terms,
+                       PlaneStageSums& sums)
+{
+  const Eigen::Matrix3d &R = fit.surface.surface.R, &Rp = fit.plane.surface.R;
+  const int padded = batch.paddedSize(), room = kernel::kMaxTheta - terms.np;
+  thread_local std::vector<double> response;
+  for (int first = 0; first < terms.n; first += room) {
+    const int rows = std::min(room, terms.n - first);
+    response.assign(static_cast<std::size_t>(kernel::kMaxTheta * padded), 0.0);
+    for (int i = 0; i < batch.size(); ++i) {
+      const Eigen::Vector3d r = sharedDirection(batch, i);
+      Eigen::Matrix<double, kernel::kMaxTheta, 1> y;
+      y.head(terms.np) = terms.plane(i) * (Rp.transpose() * r);
+      y.segment(terms.np, rows) =
+          terms.surface(i).middleRows(first, rows) * (R.transpose() * r);
+      for (int a = 0; a < terms.np + rows; ++a)
+        response[static_cast<std::size_t>(a * padded + i)] = y[a];
+    }
+    const PatternMatrix sum = fit.support.sum(batch, fit.scatter, R, response.data());
+    sums.with_surface.block(0, first, terms.np, rows) +=
+        sum.block(0, terms.np, terms.np, rows);
+    if (first == 0)
+      sums.with_moments.topRows(terms.np) +=
+          sum.block(0, kernel::kMaxTheta, terms.np, 9);
+  }
+}
+
+// \param with_pattern false: of what errors make that points do not share.
+PlaneStageSums
+planeStageSums(const PatchFit& fit,
+               const PointBatch& batch,
+               const FitOptions& options,
+               bool with_pattern)
+{
+  const Eigen::Matrix3d &R = fit.surface.surface.R, &Rp = fit.plane.surface.R;
+  const StageGradients terms = stageGradients(fit, batch, options.residual);
+  const int n = terms.n, np = terms.np;
   PlaneStageSums sums;
   sums.with_surface.setZero();
   sums.with_moments.setZero();
   for (int i = 0; i < batch.size(); ++i) {
-    const Eigen::Map<const Terms> Xi(X.data() + 3 * n * i, n, 3);
-    const Eigen::Map<const Terms> Xpi(Xp.data() + 3 * np * i, np, 3);
     // To the axes of the surface.
-    const Terms noise = Xpi * plane.R.transpose() * batch.covariance(i) * surface.R;
-    sums.with_surface.topLeftCorner(np, n) += noise * Xi.transpose();
+    const StageGradients::Terms noise =
+        terms.plane(i) * Rp.transpose() * countedCovariance(batch, i, with_pattern) * R;
+    sums.with_surface.topLeftCorner(np, n) += noise * terms.surface(i).transpose();
     const Eigen::Vector3d qt =
-        surface.R.transpose() * (batch.point(i) - batch.origin() - fit.scatter.mean);
+        R.transpose() * (batch.point(i) - batch.origin() - fit.scatter.mean);
     sums.with_moments.topLeftCorner(np, 3) += noise;
     for (int b = 0, entry = 3; b < 3; ++b)
       for (int c = b; c < 3; ++c, ++entry)
@@ -111,27 +195,30 @@ planeStageSums(const PatchFit& fit, const PointBatch& batch, const FitOptions& o
             noise.col(b) * qt[c] + noise.col(c) * qt[b];
   }
   sums.with_moments /= batch.size();
+  const SurfaceFit& plane = fit.plane;
+  sums.own = with_pattern || !plane.white ? plane.linearization.XX : plane.white->XX;
+  if (with_pattern && batch.pattern() != nullptr) {
+    sums.own += plane.linearization.pattern.topLeftCorner<6, 6>();
+    addPatternOfPlaneStage(fit, batch, terms, sums);
+  }
   return sums;
 }
 
 // What the plane stage adds to the covariance.
 ParameterMatrix
-planeStageTerms(const PatchFit& fit,
-                const PointBatch& batch,
-                const FitOptions& options,
-                const PatchJacobian& F,
-                const ByTheta& G,
-                const ByMoments& M,
-                CovarianceMode mode)
+planeStageCovariance(const PatchFit& fit,
+                     const PlaneStageSums& sums,
+                     const PatchJacobian& F,
+                     const ByTheta& G,
+                     const ByMoments& M,
+                     CovarianceMode mode)
 {
-  const PlaneStageSums sums = planeStageSums(fit, batch, options);
   ByTheta F_plane = ByTheta::Zero(G.rows(), 6);
   F_plane.leftCols<3>() = F.middleCols<3>(JointLayout::kPlane);
   const ByTheta Gp = gain(F_plane, symmetricInverse(hessianOf(fit.plane, mode)));
   const ParameterMatrix cross =
       Gp * (sums.with_surface * G.transpose() + sums.with_moments * M.transpose());
-  return symmetrized(
-      ParameterMatrix(Gp * fit.plane.linearization.XX * Gp.transpose() + 2.0 * cross));
+  return symmetrized(ParameterMatrix(Gp * sums.own * Gp.transpose() + 2.0 * cross));
 }
 
 // What errors that points share add to the covariance.
@@ -173,7 +260,13 @@ firstOrderCovariance(const PatchJacobian& F,
   if (l.has_pattern)
     covariance += patternTerms(l.pattern, G, M);
   if (fit.has_plane_stage)
-    covariance += planeStageTerms(fit, batch, options, F, G, M, mode);
+    covariance +=
+        planeStageCovariance(fit,
+                             planeStageSums(fit, batch, options, l.has_pattern),
+                             F,
+                             G,
+                             M,
+                             mode);
   return symmetrized(covariance);
 }
 
@@ -205,9 +298,9 @@ jointCovariance(const PatchFit& fit, const PointBatch& batch, const FitOptions& 
   }
   if (fit.has_plane_stage) {
     const Linearization& p = fit.plane.linearization;
-    const PlaneStageSums sums = planeStageSums(fit, batch, options);
+    const PlaneStageSums sums = planeStageSums(fit, batch, options, l.has_pattern);
     const ThetaMatrix plane = p.H.llt().solve(ThetaMatrix(ThetaMatrix::Identity()));
-    const ThetaMatrix own = plane * p.XX * plane;
+    const ThetaMatrix own = plane * sums.own * plane;
     const ThetaMatrix with_theta =
         inverse *
         (sums.with_surface.transpose() + l.A * sums.with_moments.transpose()) * plane;

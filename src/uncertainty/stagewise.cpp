@@ -287,6 +287,20 @@ runChain(const PatchFit& fit, const PointBatch& batch, const FitOptions& options
 
 } // namespace stagewise
 
+namespace {
+
+PointBatch
+independentPoints(const PointBatch& batch)
+{
+  PointBatch independent;
+  independent.clear(batch.origin(), batch.viewpoint());
+  for (int i = 0; i < batch.size(); ++i)
+    independent.add(batch.point(i), batch.covariance(i));
+  return independent;
+}
+
+} // namespace
+
 ParameterMatrix
 stagewiseCovariance(const PatchFit& fit,
                     const PointBatch& batch,
@@ -294,6 +308,13 @@ stagewiseCovariance(const PatchFit& fit,
 {
   if (fit.status != FitStatus::Converged)
     return {};
+  if (batch.pattern() != nullptr) {
+    // The sums of a fit that knows what errors share are no longer those of independent
+    // ones, which are all that the paper's stages know.
+    PointBatch independent = independentPoints(batch);
+    const PatchFit same = PatchFitter(options).fit(independent);
+    return stagewiseCovariance(same, independent, options);
+  }
   return stagewise::runChain(fit, batch, options).covariance;
 }
 

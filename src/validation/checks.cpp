@@ -18,37 +18,18 @@ isWithin(double value, std::optional<double> limit)
   return !limit || value <= *limit;
 }
 
+// What was not measured passes.
+bool
+isWithin(std::optional<double> value, std::optional<double> limit)
+{
+  return !value || isWithin(*value, limit);
+}
+
 // The same of a length in terms of the radius.
 bool
 isWithinRadii(double length_m, std::optional<double> limit, double radius_m)
 {
   return radius_m <= 0.0 || !limit || length_m <= *limit * radius_m;
-}
-
-PatchVerdict
-judge(const Validation& measured, const ValidationOptions& options, double radius_m)
-{
-  if (measured.residual.points == 0)
-    return PatchVerdict::NotUsable;
-  if (!isWithinRadii(measured.extent_m, options.max_extent, radius_m))
-    return PatchVerdict::ExtentTooLarge;
-  if (!isWithinRadii(measured.sagitta_m, options.max_sagitta, radius_m))
-    return PatchVerdict::SagittaTooLarge;
-  if (!isWithin(measured.curvature_per_m, options.max_curvature_per_m) ||
-      (radius_m > 0.0 &&
-       !isWithin(measured.curvature_per_m * radius_m, options.max_bend)))
-    return PatchVerdict::CurvatureTooLarge;
-  if (!isWithin(measured.view_angle_rad, options.max_view_angle_rad))
-    return PatchVerdict::NormalNotSeen;
-  if (!isWithin(measured.residual.rms_m, options.max_residual_m))
-    return PatchVerdict::ResidualTooLarge;
-  if (!isWithinRadii(measured.residual.largest_m, options.max_departure, radius_m))
-    return PatchVerdict::DepartureTooLarge;
-  if (options.min_coverage && !(measured.coverage.share >= *options.min_coverage))
-    return PatchVerdict::CoverageTooLow;
-  if (!isWithin(measured.chi2_per_dof, options.max_chi2_per_dof))
-    return PatchVerdict::ChiSquareTooLarge;
-  return PatchVerdict::Accepted;
 }
 
 // Of the state's moments: bounds depend on the containment, too.
@@ -69,6 +50,24 @@ sagittaOf(const Patch& patch)
 }
 
 double
+noiseOf(const PointBatch& points)
+{
+  const double* xx = points.channel(PointBatch::SXX);
+  const double* yy = points.channel(PointBatch::SYY);
+  const double* zz = points.channel(PointBatch::SZZ);
+  double sum = 0.0;
+  for (int i = 0; i < points.size(); ++i)
+    sum += xx[i] + yy[i] + zz[i];
+  return std::sqrt(sum / std::max(points.size(), 1));
+}
+
+double
+noiseOf(const std::vector<Eigen::Vector3d>&)
+{
+  return 0.0;
+}
+
+std::optional<double>
 viewAngle(const Patch& patch, const PointBatch& points)
 {
   const Eigen::Vector3d ray = points.viewpoint() - patch.c;
@@ -76,10 +75,10 @@ viewAngle(const Patch& patch, const PointBatch& points)
   return std::acos(std::clamp(cosine, -1.0, 1.0));
 }
 
-double
+std::optional<double>
 viewAngle(const Patch&, const std::vector<Eigen::Vector3d>&)
 {
-  return 0.0;
+  return std::nullopt;
 }
 
 template <typename Points>
@@ -100,11 +99,12 @@ check(const FitResult& fit,
   validation.sagitta_m = sagittaOf(fit.patch);
   if (options.max_view_angle_rad)
     validation.view_angle_rad = viewAngle(fit.patch, points);
+  validation.noise_m = noiseOf(points);
   const LocalPoints placed(fit.patch, points);
   validation.residual = residualOf(fit.patch, placed);
   validation.coverage = coverageOf(fit.patch, placed, options.coverage);
   validation.chi2_per_dof = chi2PerDof(fit);
-  validation.verdict = judge(validation, options, radius_m);
+  validation.verdict = verdictOf(validation, options, radius_m);
   return validation;
 }
 
@@ -118,6 +118,7 @@ ValidationOptions::withoutLimits()
                            &ValidationOptions::max_sagitta,
                            &ValidationOptions::max_bend,
                            &ValidationOptions::max_departure,
+                           &ValidationOptions::max_noise,
                            &ValidationOptions::max_stray,
                            &ValidationOptions::max_view_angle_rad,
                            &ValidationOptions::min_coverage,
@@ -135,6 +136,7 @@ validityError(const ValidationOptions& options)
       {&ValidationOptions::max_sagitta, "max_sagitta"},
       {&ValidationOptions::max_bend, "max_bend"},
       {&ValidationOptions::max_departure, "max_departure"},
+      {&ValidationOptions::max_noise, "max_noise"},
       {&ValidationOptions::max_stray, "max_stray"},
       {&ValidationOptions::max_view_angle_rad, "max_view_angle_rad"},
       {&ValidationOptions::max_curvature_per_m, "max_curvature_per_m"},
@@ -153,6 +155,36 @@ std::string_view
 verdictName(PatchVerdict verdict)
 {
   return kVerdictNames.of(verdict);
+}
+
+PatchVerdict
+verdictOf(const Validation& measured, const ValidationOptions& options, double radius_m)
+{
+  if (measured.residual.points == 0)
+    return PatchVerdict::NotUsable;
+  if (!isWithinRadii(measured.noise_m, options.max_noise, radius_m))
+    return PatchVerdict::NoiseTooLarge;
+  if (!isWithinRadii(measured.extent_m, options.max_extent, radius_m))
+    return PatchVerdict::ExtentTooLarge;
+  if (!isWithinRadii(measured.sagitta_m, options.max_sagitta, radius_m))
+    return PatchVerdict::SagittaTooLarge;
+  if (!isWithin(measured.curvature_per_m, options.max_curvature_per_m) ||
+      (radius_m > 0.0 &&
+       !isWithin(measured.curvature_per_m * radius_m, options.max_bend)))
+    return PatchVerdict::CurvatureTooLarge;
+  if (!isWithin(measured.view_angle_rad, options.max_view_angle_rad))
+    return PatchVerdict::NormalNotSeen;
+  if (!isWithin(measured.residual.rms_m, options.max_residual_m))
+    return PatchVerdict::ResidualTooLarge;
+  if (!isWithinRadii(measured.residual.unexplained_m, options.max_departure, radius_m))
+    return PatchVerdict::DepartureTooLarge;
+  if (options.min_coverage && !(measured.coverage.share >= *options.min_coverage))
+    return PatchVerdict::CoverageTooLow;
+  if (!isWithin(measured.chi2_per_dof, options.max_chi2_per_dof))
+    return PatchVerdict::ChiSquareTooLarge;
+  if (!isWithin(measured.stray_share, options.max_stray))
+    return PatchVerdict::OverEdge;
+  return PatchVerdict::Accepted;
 }
 
 Validation

@@ -2,6 +2,7 @@
 
 #include <holdfast/patch/surface.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 
@@ -22,10 +23,10 @@ formOf(const Patch& patch, const Eigen::Vector3d& origin)
 }
 
 kernel::Points
-coordinatesOf(const PointBatch& points)
+viewOf(const PointBatch& points)
 {
   kernel::Points view{};
-  for (int i = 0; i < 3; ++i)
+  for (int i = 0; i <= PointBatch::SZZ; ++i)
     view.channel[i] = points.channel(static_cast<PointBatch::Channel>(i));
   view.padded_size = points.paddedSize();
   return view;
@@ -43,6 +44,8 @@ LocalPoints::LocalPoints(const Patch& patch, const std::vector<Eigen::Vector3d>&
   thread_local PointBatch batch;
   batch.clear(patch.c);
   batch.resize(static_cast<int>(points.size()));
+  for (int c = PointBatch::SXX; c <= PointBatch::SZZ; ++c)
+    std::fill_n(batch.channel(static_cast<PointBatch::Channel>(c)), points.size(), 0.0);
   for (std::size_t i = 0; i < points.size(); ++i)
     for (int k = 0; k < 3; ++k)
       batch.channel(static_cast<PointBatch::Channel>(k))[i] = points[i][k] - patch.c[k];
@@ -56,14 +59,15 @@ LocalPoints::place(const Patch& patch, const PointBatch& points)
   // Kept between patches: no allocation once they have seen the largest.
   thread_local std::vector<double> memory;
   const auto rows = static_cast<std::size_t>(points.paddedSize());
-  if (memory.size() < 5 * rows)
-    memory.resize(5 * rows);
+  if (memory.size() < 6 * rows)
+    memory.resize(6 * rows);
   double* const row = memory.data();
-  placed_ = {{row, row + rows, row + 2 * rows}, row + 3 * rows, row + 4 * rows};
+  placed_ = {{row, row + rows, row + 2 * rows},
+             row + 3 * rows,
+             row + 4 * rows,
+             row + 5 * rows};
   size_ = points.size();
-  kernel::kernel().placePoints(coordinatesOf(points),
-                               formOf(patch, points.origin()),
-                               placed_);
+  kernel::kernel().placePoints(viewOf(points), formOf(patch, points.origin()), placed_);
   leaveOutInvalid();
 }
 
@@ -83,6 +87,7 @@ LocalPoints::leaveOutInvalid()
       row[kept] = row[i];
     placed_.reach[kept] = placed_.reach[i];
     placed_.squared_distance[kept] = placed_.squared_distance[i];
+    placed_.variance[kept] = placed_.variance[i];
     ++kept;
   }
   size_ = kept;

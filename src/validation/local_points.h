@@ -53,6 +53,13 @@ public:
     return placed_.squared_distance[i];
   }
 
+  /// Of the point's error along the normal at the patch's centre, m^2; zero without
+  /// covariances.
+  double variance(int i) const
+  {
+    return placed_.variance[i];
+  }
+
 private:
   void place(const Patch& patch, const PointBatch& points);
   void leaveOutInvalid();

@@ -232,7 +232,8 @@ residualOf(const Patch& patch, const LocalPoints& points)
   const double trusted_square =
       surface.is_paraboloid ? trusted * trusted : std::numeric_limits<double>::max();
   SurfaceResidual residual;
-  double sum = 0.0, largest = 0.0;
+  constexpr double kNoise = kNoiseSigmas * kNoiseSigmas;
+  double sum = 0.0, largest = 0.0, unexplained = 0.0;
   for (int i = 0; i < points.size(); ++i) {
     double squared = points.squaredDistance(i);
     if (!(squared <= trusted_square)) {
@@ -241,9 +242,12 @@ residualOf(const Patch& patch, const LocalPoints& points)
     }
     sum += squared;
     largest = std::max(largest, squared);
+    if (squared > kNoise * points.variance(i))
+      unexplained = std::max(unexplained, squared);
   }
   residual.points = points.size();
   residual.largest_m = std::sqrt(largest);
+  residual.unexplained_m = std::sqrt(unexplained);
   if (residual.points > 0)
     residual.rms_m = std::sqrt(sum / residual.points);
   return residual;

@@ -35,7 +35,11 @@ enum class JsonLayout : std::uint8_t {
 
 /// Writes the report as one JSON object and a newline, in the frame of the file: the
 /// offset is added to every position. Numbers survive the way to text and back bit for
-/// bit; those that are not finite become null.
+/// bit; those that are not finite become null. Beside a patch's verdict stand what the
+/// limits judge: `residual` (rms, largest, and the largest
+/// that noise does not explain, m), `coverage` (share), and `measured`:
+/// extent, sagitta and noise (m), curvature (1/m), view_angle (rad), stray (share),
+/// null where it was not asked for; chi-square over chi2_expected is the fit's.
 void writeJson(std::ostream& out, const PatchReport& report, JsonLayout layout);
 
 /// Reads the cloud's name, the offset, the patches and the rejected counts of a JSON

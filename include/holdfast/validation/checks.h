@@ -28,10 +28,15 @@ struct ValidationOptions {
   /// Largest magnitude of a principal curvature times the radius: a sphere of the
   /// neighbourhood's own radius has 1, and all that is more was seen from its rim.
   std::optional<double> max_bend = 1.0;
-  /// Largest SurfaceResidual::largest_m over the radius: a point that far off is an
-  /// obstacle or another surface. (Where the noise itself reaches that far, at 3 m and
-  /// 5 cm for a Kinect, the radius is too small for the sensor.)
+  /// Largest SurfaceResidual::unexplained_m over the radius: a point that far off, and
+  /// further than its own noise reaches, is an obstacle or another surface. What noise
+  /// moves a third of the radius is none: a Kinect's does from 1.3 m on at 5 cm.
   std::optional<double> max_departure = 1.0 / 3.0;
+  /// Largest Validation::noise_m over the radius: beyond it, which points belong to a
+  /// neighbourhood is chance, and errors of the state no longer follow its covariance
+  /// (`experiment consistency --limits`: NEES/dof 1.0 to 0.5, 1.1 to 0.7, 1.4 at 1).
+  /// The radius is too small for the sensor there; for a Kinect's 5 cm from 3 m on.
+  std::optional<double> max_noise = 0.7;
   /// Largest share of the pixels that see the bounded patch and measured a point
   /// elsewhere (NeighborhoodSampler::strayShare()): bounds follow from moments and
   /// reach beyond the points, perhaps over an edge. Asked where patches are extracted
@@ -68,8 +73,8 @@ struct ValidationOptions {
 /// Empty when the options make sense, else one sentence naming the first that does not.
 std::string validityError(const ValidationOptions& options);
 
-/// Outcome of the checks; the first that fails counts: extent, sagitta, curvature,
-/// view, residual, departure, coverage, chi-square, edge.
+/// Outcome of the checks; the first that fails counts: noise, extent, sagitta,
+/// curvature, view, residual, departure, coverage, chi-square, edge.
 enum class PatchVerdict : std::uint8_t {
   Accepted,
   NotUsable, ///< the fit has no usable patch, or there is no finite point
@@ -81,14 +86,15 @@ enum class PatchVerdict : std::uint8_t {
   SagittaTooLarge,
   DepartureTooLarge, ///< a single point
   NormalNotSeen, ///< the surface is at a graze
-  OverEdge ///< pixels that see the patch measured points elsewhere
+  OverEdge, ///< pixels that see the patch measured points elsewhere
+  NoiseTooLarge ///< for the radius
 };
 
 /// "accepted", "curvature_too_large", ... as in the program's JSON.
 std::string_view verdictName(PatchVerdict verdict);
 
-/// The verdict and what was measured, which is there whatever the limits, unless the
-/// fit is not usable.
+/// The verdict and what was measured, which is there whatever the limits unless stated,
+/// if the fit is usable.
 struct Validation {
   PatchVerdict verdict = PatchVerdict::NotUsable;
   double curvature_per_m = 0.0; ///< largest magnitude at the centre
@@ -98,12 +104,25 @@ struct Validation {
   /// By how much the surface rises at most over its tangent plane within the bounds, m:
   /// the stronger curvature over the longer bound.
   double sagitta_m = 0.0;
-  double view_angle_rad = 0.0; ///< zero where the viewpoint is unknown
-  double stray_share = 0.0; ///< zero where it was not asked for
+  /// Root mean square error of a single point, m: of the trace of its covariance. Zero
+  /// without covariances.
+  double noise_m = 0.0;
+  /// Nothing without a limit, or where the viewpoint is unknown.
+  std::optional<double> view_angle_rad;
+  /// Nothing without a limit, where pixels cannot tell, or where another check had
+  /// turned the patch down.
+  std::optional<double> stray_share;
   SurfaceResidual residual;
   Coverage coverage;
   double chi2_per_dof = 0.0; ///< zero without degrees of freedom
 };
+
+/// What other limits say of what was measured before. What was not measured then
+/// passes.
+/// \param radius_m as validate()
+PatchVerdict verdictOf(const Validation& measured,
+                       const ValidationOptions& options,
+                       double radius_m = 0.0);
 
 /// Checks a fit against the points it was made from. Takes no memory from the heap, and
 /// a fraction of the time of the fit.

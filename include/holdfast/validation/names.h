@@ -6,7 +6,7 @@
 
 namespace holdfast {
 
-inline constexpr EnumNames<PatchVerdict, 11> kVerdictNames{{"accepted",
+inline constexpr EnumNames<PatchVerdict, 12> kVerdictNames{{"accepted",
                                                             "not_usable",
                                                             "curvature_too_large",
                                                             "residual_too_large",
@@ -16,6 +16,7 @@ inline constexpr EnumNames<PatchVerdict, 11> kVerdictNames{{"accepted",
                                                             "sagitta_too_large",
                                                             "departure_too_large",
                                                             "normal_not_seen",
-                                                            "over_edge"}};
+                                                            "over_edge",
+                                                            "noise_too_large"}};
 
 } // namespace holdfast

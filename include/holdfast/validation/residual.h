@@ -36,10 +36,18 @@ Eigen::Vector3d nearestSurfacePoint(const Patch& patch, const Eigen::Vector3d& p
 /// kappa t = 0.5.
 double approximateDistanceToSurface(const Patch& patch, const Eigen::Vector3d& point);
 
+/// A single point within as many of its sigmas may be noise: one patch of five hundred
+/// points in thirty has one beyond by chance.
+inline constexpr double kNoiseSigmas = 4.0;
+
 /// Distances of the points of a neighbourhood to the surface of a patch.
 struct SurfaceResidual {
   double rms_m = 0.0; ///< root of the mean squared distance
   double largest_m = 0.0;
+  /// Largest of those that the noise does not explain: of points that are further off
+  /// than kNoiseSigmas of their own sigmas along the patch's normal. Of points without
+  /// covariances largest_m.
+  double unexplained_m = 0.0;
   int points = 0; ///< those that are finite; without any, the others are zero
 };
 
