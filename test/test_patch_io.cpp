@@ -1,15 +1,20 @@
 #include <holdfast/io/atomic_file.h>
 #include <holdfast/io/patch_io.h>
+#include <holdfast/pcl/conversions.h>
+#include <holdfast/pcl/point_types.h>
 
 #include "support/random.h"
 #include "support/run_program.h"
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <pcl/io/pcd_io.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <limits>
 #include <sstream>
 
@@ -274,6 +279,33 @@ meshCounts(const std::string& ply)
     return std::stoi(ply.substr(ply.find(entry) + entry.size()));
   };
   return {count("vertex"), count("face")};
+}
+
+// What else PatchPoint holds, test_point_types and test_conversions ask.
+TEST(PatchIo, PclReadsPatchPoints)
+{
+  const PatchReport report = someReport();
+  const Eigen::Vector3d offset(1000.0, -2000.0, 3.5);
+  const std::string path = test::freshFolder("patch_points") + "/patches.pcd";
+  {
+    std::ofstream file(path, std::ios::binary);
+    writePatchPoints(file, report.result.patches, report.sensor_pose, offset);
+  }
+  pcl::PointCloud<PatchPoint> read;
+  ASSERT_EQ(pcl::io::loadPCDFile(path, read), 0);
+  const auto expected = toPatchCloud(report.result.patches, report.sensor_pose);
+  ASSERT_EQ(read.size(), expected.size());
+  for (std::size_t i = 0; i < read.size(); ++i) {
+    EXPECT_EQ(read[i].getVector3fMap(), expected[i].getVector3fMap());
+    EXPECT_EQ(read[i].getNormalVector3fMap(), expected[i].getNormalVector3fMap());
+    EXPECT_EQ(std::memcmp(read[i].state, expected[i].state, sizeof read[i].state), 0);
+    EXPECT_EQ(read[i].seed, expected[i].seed);
+    EXPECT_EQ(read[i].boundary, expected[i].boundary);
+    EXPECT_EQ(read[i].verdict, expected[i].verdict);
+  }
+  EXPECT_EQ(read.sensor_origin_.head<3>(), expected.sensor_origin_.head<3>());
+  EXPECT_EQ(read.sensor_orientation_.coeffs(), expected.sensor_orientation_.coeffs());
+  EXPECT_EQ(test::readFile(path).substr(0, 25), "# add 1000 -2000 3.5 m to");
 }
 
 TEST(PatchIo, MeshIsWhatItsHeaderSays)

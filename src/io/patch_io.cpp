@@ -1,3 +1,5 @@
+#include "pcd_writer.h"
+
 #include <holdfast/fit/names.h>
 #include <holdfast/io/names.h>
 #include <holdfast/io/patch_io.h>
@@ -12,7 +14,6 @@
 #include <nlohmann/json.hpp>
 
 #include <pcl/conversions.h>
-#include <pcl/io/pcd_io.h>
 
 #include <Eigen/Geometry>
 
@@ -21,7 +22,6 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <sstream>
 #include <stdexcept>
 
 namespace holdfast {
@@ -648,22 +648,12 @@ writePatchPoints(std::ostream& out,
   const pcl::PointCloud<PatchPoint> cloud = toPatchCloud(patches, sensor_pose);
   pcl::PCLPointCloud2 fields;
   pcl::toPCLPointCloud2(cloud, fields);
-  // Not straight to `out`: PCL changes a stream's locale, which makes a std::ofstream
-  // on a full disk throw std::bad_cast.
-  std::ostringstream pcd;
-  const int failed = pcl::PCDWriter().writeBinaryCompressed(pcd,
-                                                            fields,
-                                                            cloud.sensor_origin_,
-                                                            cloud.sensor_orientation_);
-  if (failed != 0)
-    out.setstate(std::ios::failbit);
-  if (failed == 0 && !offset.isZero(0.0))
+  if (!offset.isZero(0.0))
     out << fmt::format("# add {} {} {} m to x y z: single precision cannot hold them\n",
                        offset.x(),
                        offset.y(),
                        offset.z());
-  if (failed == 0)
-    out << pcd.str();
+  io::writePcdCompressed(out, fields, cloud.sensor_origin_, cloud.sensor_orientation_);
 }
 
 std::array<std::uint8_t, 3>
