@@ -372,26 +372,42 @@ struct Column {
 
 using Axes = std::array<Column, 3>;
 
+/// Appends n points from coordinate(axis, point); by blocks, since to append one by one
+/// takes longer than to read them.
+template <typename Coordinate>
+void
+appendPoints(std::size_t n, const Coordinate& coordinate, RawCloud& cloud)
+{
+  std::array<pcl::PointXYZ, 256> block;
+  auto& points = cloud.points->points;
+  points.reserve(n);
+  for (std::size_t first = 0; first < n; first += block.size()) {
+    const std::size_t count = std::min(block.size(), n - first);
+    for (std::size_t i = 0; i < count; ++i)
+      for (std::size_t k = 0; k < 3; ++k)
+        block[i].data[k] = coordinate(k, first + i);
+    points.insert(points.end(), block.data(), block.data() + count);
+  }
+}
+
 /// Single precision stays what it is.
 template <typename Scale>
 void
-copyFloats(const Axes& xyz, std::size_t n, const Scale& scale, RawCloud& cloud)
+appendFloats(const Axes& xyz, std::size_t n, const Scale& scale, RawCloud& cloud)
 {
-  const auto coordinate = [&](std::size_t k, std::size_t i) {
-    float value;
-    std::memcpy(&value, xyz[k].at(i), sizeof(value));
-    return scale(value);
-  };
-  auto& points = cloud.points->points;
-  points.reserve(n);
-  for (std::size_t i = 0; i < n; ++i)
-    points.emplace_back(coordinate(0, i), coordinate(1, i), coordinate(2, i));
+  appendPoints(
+      n,
+      [&xyz, &scale](std::size_t k, std::size_t i) {
+        float value;
+        std::memcpy(&value, xyz[k].at(i), sizeof(value));
+        return scale(value);
+      },
+      cloud);
 }
 
 void
 fillPositions(const Axes& xyz, std::size_t n, bool exceed_float, RawCloud& cloud)
 {
-  auto& points = cloud.points->points;
   const double unit = cloud.info.unit_m;
   const auto in_m = [unit](double value) { return static_cast<float>(unit * value); };
   const bool all_floats = std::all_of(xyz.begin(), xyz.end(), [](const Column& column) {
@@ -401,22 +417,22 @@ fillPositions(const Axes& xyz, std::size_t n, bool exceed_float, RawCloud& cloud
     std::vector<double> values(3 * n);
     for (std::size_t i = 0; i < values.size(); ++i)
       values[i] = unit * xyz[i % 3].value(i / 3);
-    points.resize(n);
+    cloud.points->points.resize(n);
     placePoints(values, cloud);
   }
   else if (all_floats && unit == 1.0)
-    copyFloats(
+    appendFloats(
         xyz,
         n,
         [](float value) { return value; },
         cloud);
   else if (all_floats)
-    copyFloats(xyz, n, in_m, cloud);
+    appendFloats(xyz, n, in_m, cloud);
   else
-    for (std::size_t i = 0; i < n; ++i)
-      points.emplace_back(in_m(xyz[0].value(i)),
-                          in_m(xyz[1].value(i)),
-                          in_m(xyz[2].value(i)));
+    appendPoints(
+        n,
+        [&](std::size_t k, std::size_t i) { return in_m(xyz[k].value(i)); },
+        cloud);
 }
 
 void
