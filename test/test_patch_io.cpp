@@ -145,14 +145,20 @@ TEST(PatchIo, FilesOfALaterSchemaAreRefused)
   }
 }
 
+std::vector<std::string>
+membersOf(const nlohmann::ordered_json& json)
+{
+  std::vector<std::string> members;
+  for (const auto& item : json.items())
+    members.push_back(item.key());
+  return members;
+}
+
 TEST(PatchIo, JsonHasTheDocumentedMembers)
 {
   const auto json =
       nlohmann::ordered_json::parse(jsonText(someReport(), JsonLayout::PatchPerLine));
-  std::vector<std::string> members;
-  for (const auto& item : json.items())
-    members.push_back(item.key());
-  EXPECT_EQ(members,
+  EXPECT_EQ(membersOf(json),
             (std::vector<std::string>{"holdfast",
                                       "schema",
                                       "cloud",
@@ -167,11 +173,14 @@ TEST(PatchIo, JsonHasTheDocumentedMembers)
   EXPECT_EQ(json["rejected"]["too_few_points"], 3);
   EXPECT_EQ(json["rejected"]["coverage_too_low"], 2);
   EXPECT_EQ(json["timing"]["patches_per_second"], 5000.0); // 10 patches in 2 ms
-  members.clear();
+}
+
+TEST(PatchIo, PatchesHaveTheDocumentedMembers)
+{
+  const auto json =
+      nlohmann::ordered_json::parse(jsonText(someReport(), JsonLayout::PatchPerLine));
   const auto& patch = json["patches"][0];
-  for (const auto& item : patch.items())
-    members.push_back(item.key());
-  EXPECT_EQ(members,
+  EXPECT_EQ(membersOf(patch),
             (std::vector<std::string>{"surface",
                                       "boundary",
                                       "dof",
@@ -207,6 +216,42 @@ TEST(PatchIo, JsonHasTheDocumentedMembers)
   EXPECT_EQ(patch["covariance"][9].size(), 10U);
   EXPECT_EQ(patch["covariance_mode"], "exact");
   EXPECT_EQ(patch["seed"]["index"], 17);
+}
+
+// Enough patches for several threads to print and one to write.
+TEST(PatchIo, TextIsTheSameForAnyNumberOfThreads)
+{
+  PatchReport report = someReport();
+  auto& patches = report.result.patches;
+  const std::size_t types = patches.size();
+  while (patches.size() < 3000) {
+    patches.push_back(patches[patches.size() % types]);
+    patches.back().fit.patch.c.x() += static_cast<double>(patches.size());
+  }
+  report.options.threads = 1;
+  const std::string text = jsonText(report, JsonLayout::OneLine);
+  report.options.threads = 3;
+  EXPECT_EQ(jsonText(report, JsonLayout::OneLine), text);
+  const auto json = nlohmann::json::parse(text);
+  ASSERT_EQ(json["patches"].size(), 3000U);
+  for (std::size_t i = 0; i < 3000; ++i)
+    EXPECT_EQ(json["patches"][i]["state"].back(),
+              pack(patches[i].fit.state).tail<1>()[0]);
+}
+
+TEST(PatchIo, NumbersKeepTheirKindAndSymmetryItsDigits)
+{
+  PatchReport report = someReport();
+  FitResult& fit = report.result.patches[0].fit;
+  fit.chi2 = 3.0;
+  fit.covariance(0, 1) = 1.0 / 3.0;
+  fit.covariance(1, 0) = 2.0 / 3.0; // nobody makes it symmetric
+  const auto json = nlohmann::json::parse(jsonText(report, JsonLayout::OneLine));
+  const auto& patch = json["patches"][0];
+  EXPECT_TRUE(patch["chi2"].is_number_float());
+  EXPECT_TRUE(patch["points"].is_number_integer());
+  EXPECT_EQ(patch["covariance"][0][1], 1.0 / 3.0);
+  EXPECT_EQ(patch["covariance"][1][0], 2.0 / 3.0);
 }
 
 TEST(PatchIo, OneLineIsOneLine)

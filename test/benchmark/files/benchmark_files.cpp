@@ -4,6 +4,7 @@
 /// only adds; `of_pcl` is ours over PCL's, measured in turns.
 #include "rough_cloud.h"
 
+#include <holdfast/io/atomic_file.h>
 #include <holdfast/io/cloud_io.h>
 #include <holdfast/io/patch_io.h>
 #include <holdfast/pcl/patch_extraction.h>
@@ -21,9 +22,9 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <limits>
 #include <random>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -159,21 +160,33 @@ patchReport(int count)
   return report;
 }
 
+std::string
+readText(const std::string& path)
+{
+  std::ifstream file(path, std::ios::binary);
+  std::string text(std::filesystem::file_size(path), '\0');
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  return text;
+}
+
 void
 json(benchmark::State& state)
 {
   const PatchReport report = patchReport(static_cast<int>(state.range(0)));
+  const std::string path = scratch().file("patches.json");
   Least write, read;
-  std::string text;
   for ([[maybe_unused]] auto _ : state) {
-    std::ostringstream out;
-    write.run([&] { writeJson(out, report, JsonLayout::PatchPerLine); });
-    text = out.str();
+    write.run([&] {
+      AtomicFile file(path);
+      writeJson(file.stream(), report, JsonLayout::PatchPerLine);
+      file.commit();
+    });
+    const std::string text = readText(path);
     read.run([&] { benchmark::DoNotOptimize(readJson(text).result.patches.size()); });
   }
   state.counters["write_ms"] = write.ms();
   state.counters["read_ms"] = read.ms();
-  state.counters["MB"] = 1e-6 * static_cast<double>(text.size());
+  state.counters["MB"] = 1e-6 * static_cast<double>(std::filesystem::file_size(path));
 }
 
 /// Runs the program and waits for its end.
