@@ -24,9 +24,9 @@ endif()
 # ---- pcl: the classes beside PCL's, files, and all programs ----
 
 # Asking for more components (features, io, surface, segmentation) would pull in VTK
-# and Qt. What we use of pcl_io and pcl_segmentation needs neither, so they are linked by
-# name.
-set(HOLDFAST_PCL_COMPONENTS common kdtree search octree sample_consensus filters)
+# and Qt. What we use of pcl_segmentation needs neither, so it is linked by name.
+set(HOLDFAST_CLOUDS_COMPONENTS common kdtree search octree)
+set(HOLDFAST_PCL_COMPONENTS ${HOLDFAST_CLOUDS_COMPONENTS} sample_consensus filters)
 if(NOT DEFINED HOLDFAST_WITH_PCL)
   find_package(PCL 1.12 QUIET COMPONENTS ${HOLDFAST_PCL_COMPONENTS})
 endif()
@@ -41,10 +41,9 @@ if(NOT HOLDFAST_WITH_PCL)
 endif()
 
 find_package(PCL 1.12 REQUIRED COMPONENTS ${HOLDFAST_PCL_COMPONENTS})
-find_library(HOLDFAST_PCL_IO_LIBRARY pcl_io HINTS ${PCL_LIBRARY_DIRS} REQUIRED)
 find_library(HOLDFAST_PCL_SEGMENTATION_LIBRARY pcl_segmentation
   HINTS ${PCL_LIBRARY_DIRS} REQUIRED)
-mark_as_advanced(HOLDFAST_PCL_IO_LIBRARY HOLDFAST_PCL_SEGMENTATION_LIBRARY)
+mark_as_advanced(HOLDFAST_PCL_SEGMENTATION_LIBRARY)
 
 find_package(fmt 8 REQUIRED)
 find_package(nlohmann_json 3.10 REQUIRED)
@@ -78,9 +77,12 @@ if(HOLDFAST_BUILD_APPS)
   find_package(CLI11 REQUIRED)
 endif()
 
-# PCL's own estimates, which programs, tests and benchmarks compare ours with.
-if(HOLDFAST_BUILD_EXPERIMENTS OR HOLDFAST_BUILD_TESTS OR HOLDFAST_BUILD_BENCHMARKS)
+# PCL's own estimates, readers and writers, which programs, samples, tests and benchmarks
+# compare ours with or use beside them.
+if(HOLDFAST_BUILD_EXPERIMENTS OR HOLDFAST_BUILD_TESTS OR HOLDFAST_BUILD_BENCHMARKS OR
+    HOLDFAST_BUILD_SAMPLES)
   find_library(HOLDFAST_PCL_FEATURES_LIBRARY pcl_features HINTS ${PCL_LIBRARY_DIRS}
     REQUIRED)
-  mark_as_advanced(HOLDFAST_PCL_FEATURES_LIBRARY)
+  find_library(HOLDFAST_PCL_IO_LIBRARY pcl_io HINTS ${PCL_LIBRARY_DIRS} REQUIRED)
+  mark_as_advanced(HOLDFAST_PCL_FEATURES_LIBRARY HOLDFAST_PCL_IO_LIBRARY)
 endif()

@@ -5,7 +5,10 @@ set(config_dir ${CMAKE_INSTALL_LIBDIR}/cmake/holdfast)
 
 set(components core)
 if(HOLDFAST_WITH_PCL)
-  list(APPEND components pcl)
+  list(APPEND components clouds)
+  if(TARGET holdfast_pcl)
+    list(APPEND components pcl)
+  endif()
 else()
   set(not_built REGEX "holdfast/(pcl|io)$" EXCLUDE)
 endif()
@@ -19,9 +22,11 @@ install(DIRECTORY ${PROJECT_SOURCE_DIR}/config
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 if(TARGET holdfast)
   install(TARGETS holdfast)
-  if(TARGET holdfast_viewer)
-    install(TARGETS holdfast_viewer DESTINATION ${CMAKE_INSTALL_LIBDIR}/holdfast)
-  endif()
+  foreach(module holdfast_viewer holdfast_comparison)
+    if(TARGET ${module})
+      install(TARGETS ${module} DESTINATION ${CMAKE_INSTALL_LIBDIR}/holdfast)
+    endif()
+  endforeach()
 endif()
 
 # One export set per component: core must be usable where PCL is not installed.
@@ -33,6 +38,7 @@ foreach(component IN LISTS components)
 endforeach()
 
 list(JOIN HOLDFAST_PCL_COMPONENTS " " holdfast_pcl_components)
+list(JOIN HOLDFAST_CLOUDS_COMPONENTS " " holdfast_clouds_components)
 configure_package_config_file(
   ${PROJECT_SOURCE_DIR}/cmake/holdfastConfig.cmake.in
   ${PROJECT_BINARY_DIR}/holdfastConfig.cmake

@@ -1,6 +1,6 @@
 # What a first look does without, and what samples/quickstart.sh therefore does not
 # compile: all but `holdfast fit` and `holdfast info`, the noise calibration, simulator
-# and evaluation, two covariance modes, and the classes for PCL pipelines.
+# and evaluation, two covariance modes, and the library holdfast_pcl.
 
 # Plain variables go before the options of the same names, and leave a later build in
 # the same folder as it would have been.
@@ -15,8 +15,7 @@ set(quickstart_without
   src/simulation/ src/evaluation/ src/sensor/noise_calibration
   src/sensor/pattern_calibration
   src/uncertainty/stagewise src/uncertainty/second_order
-  src/pcl/point_types src/pcl/patch_estimation_types src/pcl/range_covariance
-  src/pcl/sac_ src/pcl/patch_segmentation src/pcl/transforms src/pcl/frame_extraction
+  src/pcl/frame_extraction
   src/io/range_frame
   apps/calibrate/ apps/render/ apps/simulate.cpp apps/plot.cpp)
 # What stands in for them where the rest calls them.

@@ -33,6 +33,15 @@ add_test(NAME headers_compile_alone_finds_violations
 set_tests_properties(headers_compile_alone_finds_violations PROPERTIES
   PASS_REGULAR_EXPRESSION "holdfast/bad.h does not compile alone")
 
+if(TARGET holdfast)
+  add_test(NAME quick_start_of_the_program
+    COMMAND ${support}/check_startup.sh $<TARGET_FILE:holdfast>)
+  add_test(NAME quick_start_finds_violations
+    COMMAND ${support}/check_startup.sh ${HOLDFAST_PCL_IO_LIBRARY})
+  set_tests_properties(quick_start_finds_violations PROPERTIES
+    PASS_REGULAR_EXPRESSION "loads .*libvtk")
+endif()
+
 add_test(NAME package_setup COMMAND ${support}/check_setup.sh)
 
 add_test(NAME readme_snippet COMMAND ${support}/check_readme.sh)

@@ -200,50 +200,49 @@ TEST_F(CalibrateProgram, BadFramesAreNamed)
   expectError(1, {base + "small.pcd"}, "small.pcd: nothing large and flat");
 }
 
-TEST_F(CalibrateProgram, MapsTheFixedPatternAndFitSubtractsIt)
-{
-  // Two walls with the same errors of the pixels, and white noise.
-  test::Random random;
-  const Camera camera = test::makeCamera(160, 120, 575.8);
-  std::vector<double> fixed;
-  for (int i = 0; i < 160 * 120; ++i)
-    fixed.push_back(0.2 * random.normal());
-  const auto save = [&](const std::string& name, double du, double dv) {
+/// Three walls with the same errors of the pixels, and white noise; a map and a sensor
+/// file from the first two.
+class CalibratedMap : public CalibrateProgram {
+protected:
+  CalibratedMap()
+  {
+    for (int i = 0; i < 160 * 120; ++i)
+      fixed_.push_back(0.2 * random_.normal());
+    saveWall("/wall.pcd", 0.01, 0.02);
+    saveWall("/other.pcd", -0.02, 0.01);
+    saveWall("/third.pcd", 0.0, -0.01);
+    std::filesystem::create_directory(folder_ + "/maps");
+    run_ = calibrate({folder_ + "/wall.pcd",
+                      "--pose",
+                      folder_ + "/other.pcd",
+                      "--map",
+                      folder_ + "/maps/mine.png",
+                      "-o",
+                      sensor_,
+                      "--json",
+                      "-",
+                      "--quiet"});
+  }
+
+  void saveWall(const std::string& name, double du, double dv)
+  {
     const auto depth = [&](int u, int v) {
       const double d = 43.5 + du * u + dv * v +
-                       fixed[static_cast<std::size_t>(v * 160 + u)] +
-                       0.05 * random.normal();
+                       fixed_[static_cast<std::size_t>(v * 160 + u)] +
+                       0.05 * random_.normal();
       return 43.5 / d;
     };
+    const Camera camera = test::makeCamera(160, 120, 575.8);
     saveCloud(folder_ + name, test::makeOrganizedCloud(camera, depth));
-    return folder_ + name;
-  };
-  const std::string wall = save("/wall.pcd", 0.01, 0.02);
-  const std::string other = save("/other.pcd", -0.02, 0.01);
-  const std::string third = save("/third.pcd", 0.0, -0.01);
-  const std::string sensor = folder_ + "/mine.yaml", map = folder_ + "/maps/mine.png";
-  std::filesystem::create_directory(folder_ + "/maps");
-  const ProgramRun run = calibrate(
-      {wall, "--pose", other, "--map", map, "-o", sensor, "--json", "-", "--quiet"});
-  ASSERT_EQ(run.exit_code, 0) << run.err;
-  const Json found = Json::parse(run.out)["pattern_map"];
-  EXPECT_NEAR(found["rms_before_px"], std::hypot(0.2, 0.05), 0.005);
-  EXPECT_LT(found["rms_after_px"], 0.08);
-  EXPECT_EQ(found["smoothing_px"], 0.0);
-  EXPECT_NE(test::readFile(sensor).find("pattern_map: maps/mine.png"),
-            std::string::npos);
-  EXPECT_NEAR(dynamic_cast<const StereoNoiseModel&>(*loadSensor(sensor).noise)
-                  .parameters()
-                  .sigma_disparity_px,
-              found["rms_after_px"],
-              0.01);
+  }
 
-  // What is left of a wall it has not seen agrees with what the sensor file promises.
-  const auto ratio = [&](const Names& more) -> double {
+  /// chi2 over its degrees of freedom of the plane through a wall.
+  double chi2Ratio(const std::string& wall, const Names& more) const
+  {
     Names arguments{"fit",
-                    third,
+                    folder_ + wall,
                     "--sensor",
-                    sensor,
+                    sensor_,
                     "--whole",
                     "--accept",
                     "all",
@@ -254,16 +253,51 @@ TEST_F(CalibrateProgram, MapsTheFixedPatternAndFitSubtractsIt)
     EXPECT_EQ(fit.exit_code, 0) << fit.err;
     const Json patch = Json::parse(fit.out)["patches"][0];
     return patch["chi2"].get<double>() / patch["chi2_dof"].get<double>();
-  };
-  EXPECT_LT(ratio({}), 1.5);
-  EXPECT_GT(ratio({"--no-pattern"}), 3.0);
+  }
 
-  // Of another size.
+  test::Random random_;
+  std::vector<double> fixed_;
+  const std::string sensor_ = folder_ + "/mine.yaml";
+  ProgramRun run_;
+};
+
+TEST_F(CalibratedMap, SaysWhatItTookDown)
+{
+  ASSERT_EQ(run_.exit_code, 0) << run_.err;
+  const Json found = Json::parse(run_.out)["pattern_map"];
+  EXPECT_NEAR(found["rms_before_px"], std::hypot(0.2, 0.05), 0.005);
+  EXPECT_LT(found["rms_after_px"], 0.08);
+  EXPECT_EQ(found["smoothing_px"], 0.0);
+  EXPECT_NE(test::readFile(sensor_).find("pattern_map: maps/mine.png"),
+            std::string::npos);
+  EXPECT_NEAR(dynamic_cast<const StereoNoiseModel&>(*loadSensor(sensor_).noise)
+                  .parameters()
+                  .sigma_disparity_px,
+              found["rms_after_px"],
+              0.01);
+}
+
+// What is left of a wall it has not seen agrees with what the sensor file promises.
+TEST_F(CalibratedMap, FitSubtractsIt)
+{
+  ASSERT_EQ(run_.exit_code, 0) << run_.err;
+  EXPECT_LT(chi2Ratio("/third.pcd", {}), 1.5);
+  EXPECT_GT(chi2Ratio("/third.pcd", {"--no-pattern"}), 3.0);
+  const ProgramRun info =
+      test::runProgram(folder_, {"info", folder_ + "/third.pcd", "--sensor", sensor_});
+  EXPECT_EQ(info.exit_code, 0) << info.err;
+  EXPECT_NE((info.out + info.err).find("less the pattern map"), std::string::npos)
+      << info.out << info.err;
+}
+
+TEST_F(CalibratedMap, IsForCloudsOfItsSize)
+{
+  ASSERT_EQ(run_.exit_code, 0) << run_.err;
   saveCloud(folder_ + "/small.pcd", test::bowlCloud(40, 30));
   for (const std::string program : {"fit", "info"}) {
     const ProgramRun small =
         test::runProgram(folder_,
-                         {program, folder_ + "/small.pcd", "--sensor", sensor});
+                         {program, folder_ + "/small.pcd", "--sensor", sensor_});
     EXPECT_EQ(small.exit_code, 1);
     EXPECT_EQ(small.errorLines(), 1) << small.err;
     EXPECT_NE(small.err.find("small.pcd: 40 x 30 pixels, where the pattern map of the "
@@ -271,11 +305,6 @@ TEST_F(CalibrateProgram, MapsTheFixedPatternAndFitSubtractsIt)
               std::string::npos)
         << small.err;
   }
-  const ProgramRun info =
-      test::runProgram(folder_, {"info", third, "--sensor", sensor});
-  EXPECT_EQ(info.exit_code, 0) << info.err;
-  EXPECT_NE((info.out + info.err).find("less the pattern map"), std::string::npos)
-      << info.out << info.err;
 }
 
 TEST_F(CalibrateProgram, AMapWantsSeveralPoses)

@@ -436,4 +436,41 @@ TEST(CloudIo, RecordedClouds)
   }
 }
 
+TEST(CloudIo, ColorsComeWhereTheyAreAskedFor)
+{
+  const std::string folder = freshFolder("colors");
+  const auto pcd = [](const std::string& name, char type, const std::string& values) {
+    return "VERSION .7\nFIELDS x y z " + name + "\nSIZE 4 4 4 4\nTYPE F F F " + type +
+           "\nCOUNT 1 1 1 1\nWIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA " + values;
+  };
+  // 0xff102030, all bits of a NaN, as PCL writes opaque colours; and 0x405060.
+  const std::string binary = test::rawBytes(1.0F) + test::rawBytes(1.0F) +
+                             test::rawBytes(1.0F) + test::rawBytes(0xff102030U) +
+                             test::rawBytes(2.0F) + test::rawBytes(1.0F) +
+                             test::rawBytes(1.0F) + test::rawBytes(0x405060U);
+  const std::map<std::string, std::string> files{
+      {"float.pcd", pcd("rgb", 'F', "binary\n" + binary)},
+      {"rgba.pcd", pcd("rgba", 'U', "binary\n" + binary)},
+      {"integer.pcd", pcd("rgb", 'U', "ascii\n1 1 1 4279246896\n2 1 1 4214880\n")},
+      {"text.pcd",
+       pcd("rgb",
+           'F',
+           "ascii\n1 1 1 1.480914637873896e-39\n2 1 1 5.906304871313385e-39\n")},
+      {"bytes.ply",
+       "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
+       "property float z\nproperty uchar red\nproperty uchar green\n"
+       "property uchar blue\nend_header\n1 1 1 16 32 48\n2 1 1 64 80 96\n"}};
+  using Colors = std::vector<std::array<std::uint8_t, 3>>;
+  for (const auto& [name, bytes] : files) {
+    writeFile(folder + '/' + name, bytes);
+    CloudFileInfo info;
+    LoadOptions options;
+    EXPECT_EQ(loadCloud(folder + '/' + name, options, &info).points->size(), 2U);
+    EXPECT_TRUE(info.colors.empty()) << name;
+    options.colors = true;
+    loadCloud(folder + '/' + name, options, &info);
+    EXPECT_EQ(info.colors, (Colors{{16, 32, 48}, {64, 80, 96}})) << name;
+  }
+}
+
 }} // namespace holdfast

@@ -1,15 +1,20 @@
 #include <holdfast/io/atomic_file.h>
 #include <holdfast/io/patch_io.h>
+#include <holdfast/pcl/conversions.h>
+#include <holdfast/pcl/point_types.h>
 
 #include "support/random.h"
 #include "support/run_program.h"
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <pcl/io/pcd_io.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <limits>
 #include <sstream>
 
@@ -156,14 +161,20 @@ TEST(PatchIo, FilesOfALaterSchemaAreRefused)
   }
 }
 
+std::vector<std::string>
+membersOf(const nlohmann::ordered_json& json)
+{
+  std::vector<std::string> members;
+  for (const auto& item : json.items())
+    members.push_back(item.key());
+  return members;
+}
+
 TEST(PatchIo, JsonHasTheDocumentedMembers)
 {
   const auto json =
       nlohmann::ordered_json::parse(jsonText(someReport(), JsonLayout::PatchPerLine));
-  std::vector<std::string> members;
-  for (const auto& item : json.items())
-    members.push_back(item.key());
-  EXPECT_EQ(members,
+  EXPECT_EQ(membersOf(json),
             (std::vector<std::string>{"holdfast",
                                       "schema",
                                       "cloud",
@@ -178,11 +189,14 @@ TEST(PatchIo, JsonHasTheDocumentedMembers)
   EXPECT_EQ(json["rejected"]["too_few_points"], 3);
   EXPECT_EQ(json["rejected"]["coverage_too_low"], 2);
   EXPECT_EQ(json["timing"]["patches_per_second"], 5000.0); // 10 patches in 2 ms
-  members.clear();
+}
+
+TEST(PatchIo, PatchesHaveTheDocumentedMembers)
+{
+  const auto json =
+      nlohmann::ordered_json::parse(jsonText(someReport(), JsonLayout::PatchPerLine));
   const auto& patch = json["patches"][0];
-  for (const auto& item : patch.items())
-    members.push_back(item.key());
-  EXPECT_EQ(members,
+  EXPECT_EQ(membersOf(patch),
             (std::vector<std::string>{"surface",
                                       "boundary",
                                       "dof",
@@ -219,6 +233,42 @@ TEST(PatchIo, JsonHasTheDocumentedMembers)
   EXPECT_EQ(patch["covariance"][9].size(), 10U);
   EXPECT_EQ(patch["covariance_mode"], "exact");
   EXPECT_EQ(patch["seed"]["index"], 17);
+}
+
+// Enough patches for several threads to print and one to write.
+TEST(PatchIo, TextIsTheSameForAnyNumberOfThreads)
+{
+  PatchReport report = someReport();
+  auto& patches = report.result.patches;
+  const std::size_t types = patches.size();
+  while (patches.size() < 3000) {
+    patches.push_back(patches[patches.size() % types]);
+    patches.back().fit.patch.c.x() += static_cast<double>(patches.size());
+  }
+  report.options.threads = 1;
+  const std::string text = jsonText(report, JsonLayout::OneLine);
+  report.options.threads = 3;
+  EXPECT_EQ(jsonText(report, JsonLayout::OneLine), text);
+  const auto json = nlohmann::json::parse(text);
+  ASSERT_EQ(json["patches"].size(), 3000U);
+  for (std::size_t i = 0; i < 3000; ++i)
+    EXPECT_EQ(json["patches"][i]["state"].back(),
+              pack(patches[i].fit.state).tail<1>()[0]);
+}
+
+TEST(PatchIo, NumbersKeepTheirKindAndSymmetryItsDigits)
+{
+  PatchReport report = someReport();
+  FitResult& fit = report.result.patches[0].fit;
+  fit.chi2 = 3.0;
+  fit.covariance(0, 1) = 1.0 / 3.0;
+  fit.covariance(1, 0) = 2.0 / 3.0; // nobody makes it symmetric
+  const auto json = nlohmann::json::parse(jsonText(report, JsonLayout::OneLine));
+  const auto& patch = json["patches"][0];
+  EXPECT_TRUE(patch["chi2"].is_number_float());
+  EXPECT_TRUE(patch["points"].is_number_integer());
+  EXPECT_EQ(patch["covariance"][0][1], 1.0 / 3.0);
+  EXPECT_EQ(patch["covariance"][1][0], 2.0 / 3.0);
 }
 
 TEST(PatchIo, OneLineIsOneLine)
@@ -291,6 +341,33 @@ meshCounts(const std::string& ply)
     return std::stoi(ply.substr(ply.find(entry) + entry.size()));
   };
   return {count("vertex"), count("face")};
+}
+
+// What else PatchPoint holds, test_point_types and test_conversions ask.
+TEST(PatchIo, PclReadsPatchPoints)
+{
+  const PatchReport report = someReport();
+  const Eigen::Vector3d offset(1000.0, -2000.0, 3.5);
+  const std::string path = test::freshFolder("patch_points") + "/patches.pcd";
+  {
+    std::ofstream file(path, std::ios::binary);
+    writePatchPoints(file, report.result.patches, report.sensor_pose, offset);
+  }
+  pcl::PointCloud<PatchPoint> read;
+  ASSERT_EQ(pcl::io::loadPCDFile(path, read), 0);
+  const auto expected = toPatchCloud(report.result.patches, report.sensor_pose);
+  ASSERT_EQ(read.size(), expected.size());
+  for (std::size_t i = 0; i < read.size(); ++i) {
+    EXPECT_EQ(read[i].getVector3fMap(), expected[i].getVector3fMap());
+    EXPECT_EQ(read[i].getNormalVector3fMap(), expected[i].getNormalVector3fMap());
+    EXPECT_EQ(std::memcmp(read[i].state, expected[i].state, sizeof read[i].state), 0);
+    EXPECT_EQ(read[i].seed, expected[i].seed);
+    EXPECT_EQ(read[i].boundary, expected[i].boundary);
+    EXPECT_EQ(read[i].verdict, expected[i].verdict);
+  }
+  EXPECT_EQ(read.sensor_origin_.head<3>(), expected.sensor_origin_.head<3>());
+  EXPECT_EQ(read.sensor_orientation_.coeffs(), expected.sensor_orientation_.coeffs());
+  EXPECT_EQ(test::readFile(path).substr(0, 25), "# add 1000 -2000 3.5 m to");
 }
 
 TEST(PatchIo, MeshIsWhatItsHeaderSays)

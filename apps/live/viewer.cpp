@@ -1,8 +1,7 @@
 #include "viewer.h"
 
-#include <dlfcn.h>
+#include "module.h"
 
-#include <filesystem>
 #include <stdexcept>
 
 namespace holdfast::app {
@@ -10,19 +9,14 @@ namespace holdfast::app {
 std::unique_ptr<Viewer>
 openViewer(const std::string& note)
 {
-  // Beside the program, in the build folder as when installed.
-  const std::filesystem::path module =
-      std::filesystem::canonical("/proc/self/exe").parent_path() / HOLDFAST_VIEWER;
-  if (!std::filesystem::exists(module))
-    throw std::runtime_error("--view: this holdfast was built without its viewer");
-  // Never closed: VTK does not survive that.
-  void* library = ::dlopen(module.c_str(), RTLD_NOW | RTLD_LOCAL);
-  if (library == nullptr)
-    throw std::runtime_error(std::string("--view: ") + ::dlerror());
-  const auto open = reinterpret_cast<decltype(&holdfastOpenViewer)>(
-      ::dlsym(library, "holdfastOpenViewer"));
-  if (open == nullptr)
-    throw std::runtime_error(module.string() + ": is no viewer");
+  decltype(&holdfastOpenViewer) open = nullptr;
+  try {
+    open = reinterpret_cast<decltype(open)>(
+        loadModuleFunction("holdfast_viewer", "holdfastOpenViewer"));
+  }
+  catch (const std::runtime_error& error) {
+    throw std::runtime_error(std::string("--view: ") + error.what());
+  }
   return std::unique_ptr<Viewer>(open(note));
 }
 

@@ -13,8 +13,6 @@
 #include <holdfast/simulation/reference_scenes.h>
 
 #include <pcl/common/point_tests.h>
-#include <pcl/io/pcd_io.h>
-#include <pcl/io/ply_io.h>
 
 #include <CLI/CLI.hpp>
 
@@ -104,24 +102,9 @@ findCloud(const std::string& result, const std::string& cloud)
                            " is neither here nor beside it: --cloud FILE tells where");
 }
 
-/// The colours in a PCD or PLY file, or nothing. Our own reader keeps coordinates only.
-pcl::PointCloud<pcl::RGB>
-readColors(const std::string& path, const CloudFileInfo& info)
-{
-  pcl::PointCloud<pcl::RGB> colors;
-  const auto has = [&info](const char* field) {
-    return std::find(info.fields.begin(), info.fields.end(), field) !=
-           info.fields.end();
-  };
-  if (has("rgb") || has("rgba"))
-    pcl::io::loadPCDFile(path, colors);
-  else if (has("red") && has("green") && has("blue"))
-    pcl::io::loadPLYFile(path, colors);
-  return colors;
-}
-
 PicturePoints
-picturePoints(const RangeCloud& cloud, const pcl::PointCloud<pcl::RGB>& colors)
+picturePoints(const RangeCloud& cloud,
+              const std::vector<std::array<std::uint8_t, 3>>& colors)
 {
   PicturePoints points;
   for (std::size_t i = 0; i < cloud.points->size(); ++i) {
@@ -130,7 +113,7 @@ picturePoints(const RangeCloud& cloud, const pcl::PointCloud<pcl::RGB>& colors)
       continue;
     points.positions.emplace_back(point.getVector3fMap().cast<double>());
     if (colors.size() == cloud.points->size())
-      points.colors.push_back({colors[i].r, colors[i].g, colors[i].b});
+      points.colors.push_back(colors[i]);
   }
   return points;
 }
@@ -168,7 +151,9 @@ loadSubject(const std::string& result, const RenderSettings& settings)
       settings.cloud.empty() ? findCloud(result, report.cloud) : settings.cloud;
   const Sensor sensor = loadSensorOption(settings.input.sensor_name);
   CloudFileInfo info;
-  const RangeCloud raw = loadCloud(path, loadOptions(settings.input, sensor), &info);
+  LoadOptions options = loadOptions(settings.input, sensor);
+  options.colors = true;
+  const RangeCloud raw = loadCloud(path, options, &info);
   std::vector<std::string> notices;
   const RangeCloud cloud =
       withoutPatternMap(path, raw, matchedSensor(sensorOf(info, sensor), raw), notices);
@@ -184,7 +169,7 @@ loadSubject(const std::string& result, const RenderSettings& settings)
   subject.title = fs::path(path).filename().string() + ", " +
                   std::to_string(subject.patches.size()) +
                   (subject.patches.size() == 1 ? " patch" : " patches");
-  subject.points = picturePoints(cloud, readColors(path, info));
+  subject.points = picturePoints(cloud, info.colors);
   subject.sensor_pose = cloud.sensor_pose;
   subject.seen = isSeenFrom(cloud.sensor_pose, subject.points.positions);
   if (!subject.seen && !settings.aside && !settings.quiet)

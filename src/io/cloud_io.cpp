@@ -17,6 +17,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <memory>
 #include <new>
 
 #include <fmt/format.h>
@@ -121,58 +122,73 @@ nameOfStranger(std::string_view bytes)
   return std::nullopt;
 }
 
+/// All bytes of a file.
+struct Bytes {
+  std::string text; ///< of a stream
+  std::unique_ptr<char[]> block; ///< of a file; not filled with zeros first
+  std::size_t block_size = 0;
+
+  std::string_view view() const
+  {
+    return block ? std::string_view(block.get(), block_size) : std::string_view(text);
+  }
+};
+
 /// Standard input, a pipe: what has no size beforehand.
-std::string
+Bytes
 readStream(std::istream& stream)
 {
   constexpr std::size_t kBlock = 1U << 20U;
   constexpr std::size_t kLimit = std::size_t{8} << 30U;
-  std::string bytes;
+  Bytes bytes;
+  std::string& text = bytes.text;
   while (stream) {
-    const std::size_t before = bytes.size();
+    const std::size_t before = text.size();
     if (before > kLimit)
       throw std::runtime_error("more than 8 GiB do not come to an end");
-    bytes.resize(before + kBlock);
-    stream.read(&bytes[before], static_cast<std::streamsize>(kBlock));
-    bytes.resize(before + static_cast<std::size_t>(stream.gcount()));
+    text.resize(before + kBlock);
+    stream.read(&text[before], static_cast<std::streamsize>(kBlock));
+    text.resize(before + static_cast<std::size_t>(stream.gcount()));
   }
   return bytes;
 }
 
-std::string
+Bytes
 readRegular(const std::string& path, std::istream& file)
 {
-  std::string bytes(std::filesystem::file_size(path), '\0');
-  file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  if (file.gcount() != static_cast<std::streamsize>(bytes.size()))
+  Bytes bytes;
+  bytes.block_size = std::filesystem::file_size(path);
+  bytes.block.reset(new char[bytes.block_size]);
+  const auto size = static_cast<std::streamsize>(bytes.block_size);
+  file.read(bytes.block.get(), size);
+  if (file.gcount() != size)
     throw std::runtime_error("could not be read completely");
   return bytes;
 }
 
-std::string
-readBytes(const std::string& path)
+Bytes
+readFile(const std::string& path)
 {
   namespace fs = std::filesystem;
-  std::string bytes;
-  if (path == "-") {
-    bytes = readStream(std::cin);
-  }
-  else {
-    std::error_code error;
-    const fs::file_type type = fs::status(path, error).type();
-    if (type == fs::file_type::not_found)
-      throw std::runtime_error("no such file");
-    if (type == fs::file_type::directory)
-      throw std::runtime_error("is a directory, not a cloud");
-    if (type != fs::file_type::regular && type != fs::file_type::fifo)
-      throw std::runtime_error("is not a regular file");
-    std::ifstream file(path, std::ios::binary);
-    if (!file)
-      throw std::runtime_error("cannot be opened: " +
-                               std::string(std::strerror(errno)));
-    bytes = type == fs::file_type::fifo ? readStream(file) : readRegular(path, file);
-  }
-  if (bytes.empty())
+  std::error_code error;
+  const fs::file_type type = fs::status(path, error).type();
+  if (type == fs::file_type::not_found)
+    throw std::runtime_error("no such file");
+  if (type == fs::file_type::directory)
+    throw std::runtime_error("is a directory, not a cloud");
+  if (type != fs::file_type::regular && type != fs::file_type::fifo)
+    throw std::runtime_error("is not a regular file");
+  std::ifstream file(path, std::ios::binary);
+  if (!file)
+    throw std::runtime_error("cannot be opened: " + std::string(std::strerror(errno)));
+  return type == fs::file_type::fifo ? readStream(file) : readRegular(path, file);
+}
+
+Bytes
+readBytes(const std::string& path)
+{
+  Bytes bytes = path == "-" ? readStream(std::cin) : readFile(path);
+  if (bytes.view().empty())
     throw std::runtime_error("is empty");
   return bytes;
 }
@@ -190,7 +206,8 @@ readDepthImage(io::DepthImage image,
 io::RawCloud
 readAny(const std::string& path, const LoadOptions& options)
 {
-  const std::string bytes = readBytes(path);
+  const Bytes content = readBytes(path);
+  const std::string_view bytes = content.view();
   if (const auto name = nameOfStranger(bytes))
     throw std::runtime_error("is " + std::string(*name));
   switch (detectFormat(bytes, path)) {
@@ -208,17 +225,71 @@ readAny(const std::string& path, const LoadOptions& options)
   throw std::runtime_error("is neither PCD, PLY, 16-bit PNG nor PGM");
 }
 
+/// What one look at all points tells.
+struct PointSurvey {
+  std::size_t finite = 0;
+  std::size_t zeros = 0; ///< of those, the ones at 0 0 0
+  float largest = 0.0F; ///< magnitude of a finite coordinate
+};
+
+/// Point by point.
+void
+surveyAny(pcl::PointXYZ* points, std::size_t n, PointSurvey& survey)
+{
+  constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+  for (pcl::PointXYZ* p = points; p != points + n; ++p) {
+    if (!pcl::isFinite(*p)) {
+      p->x = p->y = p->z = kNaN;
+      continue;
+    }
+    ++survey.finite;
+    survey.zeros += p->z == 0.0F && p->x == 0.0F && p->y == 0.0F;
+    survey.largest = std::max(survey.largest, p->getArray3fMap().abs().maxCoeff());
+  }
+}
+
+/// In vectors, when all points are finite and none has z = 0. \return false, with
+/// nothing done, when they are not.
+bool
+surveyUsual(const pcl::PointXYZ* points, std::size_t n, PointSurvey& survey)
+{
+  using Vector = Eigen::Array4f; // x y z 1
+  Vector nothing = Vector::Zero(), largest = Vector::Zero(), least = Vector::Ones();
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vector q = points[i].getArray4fMap();
+    nothing += q - q; // NaN stays NaN, and comes from what is infinite
+    largest = largest.max(q.abs());
+    least = least.min(q.abs());
+  }
+  if (!(nothing.head<3>() == 0.0F).all() || least[2] == 0.0F)
+    return false;
+  survey.finite += n;
+  survey.largest = std::max(survey.largest, largest.head<3>().maxCoeff());
+  return true;
+}
+
+/// Makes points that are not finite NaN. In one pass: a cloud of millions does not fit
+/// into the cache.
+PointSurvey
+surveyPoints(pcl::PointCloud<pcl::PointXYZ>& points)
+{
+  constexpr std::size_t kBlock = 128;
+  PointSurvey survey;
+  for (std::size_t first = 0; first < points.size(); first += kBlock) {
+    const std::size_t n = std::min(kBlock, points.size() - first);
+    if (!surveyUsual(&points[first], n, survey))
+      surveyAny(&points[first], n, survey);
+  }
+  return survey;
+}
+
 /// Coordinates are kept in single precision.
 void
-noteCoarseCoordinates(io::RawCloud& cloud)
+noteCoarseCoordinates(float largest, CloudFileInfo& info)
 {
-  float largest = 0.0F;
-  for (const auto& point : *cloud.points)
-    if (pcl::isFinite(point))
-      largest = std::max(largest, point.getArray3fMap().abs().maxCoeff());
   const double step_m = std::ldexp(largest, -23);
   if (step_m >= 1e-4)
-    cloud.info.notices.push_back(
+    info.notices.push_back(
         fmt::format("coordinates up to {:.0f} m are only kept to {:.1g} m: if they are "
                     "in another unit, --unit says so, else move the cloud towards the "
                     "origin",
@@ -236,16 +307,6 @@ noteOffset(io::RawCloud& raw)
                     -o.x(),
                     -o.y(),
                     -o.z()));
-}
-
-/// Points are finite or NaN.
-void
-invalidateNotFinite(pcl::PointCloud<pcl::PointXYZ>& points)
-{
-  const float nan = std::numeric_limits<float>::quiet_NaN();
-  for (auto& point : points)
-    if (!pcl::isFinite(point))
-      point.getVector3fMap().setConstant(nan);
 }
 
 /// PCL writes 0 0 0 1 0 0 0 for clouds that know of no viewpoint.
@@ -331,22 +392,40 @@ applyCamera(const LoadOptions& options, io::RawCloud& raw)
   }
 }
 
+/// How many of the points at 0 0 0 stand for no return; they become NaN.
+std::size_t
+invalidatedZeros(std::size_t zeros,
+                 const std::optional<Pose>& sensor_pose,
+                 pcl::PointCloud<pcl::PointXYZ>& points)
+{
+  if (zeros == 0) // as nearly always: no pass over the points
+    return 0;
+  return static_cast<std::size_t>(
+      invalidateZeroPoints(points, sensor_pose.value_or(Pose())));
+}
+
+void
+requirePoints(std::size_t valid)
+{
+  if (valid == 0)
+    throw std::runtime_error("has no valid point");
+}
+
 RangeCloud
 finish(io::RawCloud& raw, const LoadOptions& options)
 {
   auto& points = *raw.points;
   CloudFileInfo& info = raw.info;
   info.axes = options.axes.value_or(CloudAxes::Camera);
-  invalidateNotFinite(points);
+  const PointSurvey survey = surveyPoints(points);
   dropDefaultViewpoint(info);
   applyCamera(options, raw);
   // Zeros are in nobody's view: out before the view is judged.
-  info.zero_points += invalidateZeroPoints(points, info.viewpoint.value_or(Pose()));
+  std::size_t invalid_zeros = invalidatedZeros(survey.zeros, info.viewpoint, points);
+  requirePoints(survey.finite - invalid_zeros);
   RangeCloud cloud;
   cloud.points = raw.points;
   cloud.offset = raw.offset;
-  if (countValidPoints(cloud) == 0)
-    throw std::runtime_error("has no valid point");
   cloud.sensor_pose = sensorPoseOf(raw, options);
   // In other units, or seen from points far on the other side, 1e308 is infinite.
   if (const std::string error = validityError(cloud); !error.empty())
@@ -354,15 +433,15 @@ finish(io::RawCloud& raw, const LoadOptions& options)
   // Nobody has to say the identity.
   cloud.sensor_pose_given = options.sensor_pose || options.viewpoint || options.axes ||
                             !isIdentity(cloud.sensor_pose);
-  info.zero_points += invalidateZeroPoints(points, cloud.sensor_pose);
+  invalid_zeros +=
+      invalidatedZeros(survey.zeros - invalid_zeros, cloud.sensor_pose, points);
+  requirePoints(survey.finite - invalid_zeros);
   cloud.covariances = std::move(raw.covariances);
-  const int valid = countValidPoints(cloud);
-  if (valid == 0)
-    throw std::runtime_error("has no valid point");
-  points.is_dense = static_cast<std::size_t>(valid) == points.size();
+  points.is_dense = survey.finite - invalid_zeros == points.size();
+  info.zero_points += static_cast<int>(invalid_zeros);
   noteZeroPoints(info);
   noteOffset(raw);
-  noteCoarseCoordinates(raw);
+  noteCoarseCoordinates(survey.largest, info);
   return cloud;
 }
 

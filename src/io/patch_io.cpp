@@ -1,3 +1,8 @@
+#include "json_text.h"
+#include "pcd_writer.h"
+
+#include "parallel/parallel_for.h"
+
 #include <holdfast/fit/names.h>
 #include <holdfast/io/names.h>
 #include <holdfast/io/patch_io.h>
@@ -12,7 +17,6 @@
 #include <nlohmann/json.hpp>
 
 #include <pcl/conversions.h>
-#include <pcl/io/pcd_io.h>
 
 #include <Eigen/Geometry>
 
@@ -21,7 +25,6 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <sstream>
 #include <stdexcept>
 
 namespace holdfast {
@@ -42,16 +45,6 @@ vectorJson(const Eigen::MatrixBase<Derived>& v)
   for (Eigen::Index i = 0; i < v.size(); ++i)
     array.push_back(v(i));
   return array;
-}
-
-/// What is not finite becomes null.
-Json
-matrixJson(const ParameterMatrix& m)
-{
-  Json rows = Json::array();
-  for (Eigen::Index i = 0; i < m.rows(); ++i)
-    rows.push_back(vectorJson(m.row(i).transpose()));
-  return rows;
 }
 
 Json
@@ -164,23 +157,6 @@ optionalJson(const std::optional<T>& value)
   return value ? Json(*value) : Json();
 }
 
-/// The verdict and what it is about, but for chi-square, which is the fit's.
-void
-writeMeasured(const Validation& validation, Json& patch)
-{
-  patch["verdict"] = verdictName(validation.verdict);
-  patch["residual"] = {{"rms", validation.residual.rms_m},
-                       {"largest", validation.residual.largest_m},
-                       {"unexplained", validation.residual.unexplained_m}};
-  patch["coverage"] = validation.coverage.share;
-  patch["measured"] = {{"extent", validation.extent_m},
-                       {"sagitta", validation.sagitta_m},
-                       {"curvature", validation.curvature_per_m},
-                       {"noise", validation.noise_m},
-                       {"view_angle", optionalJson(validation.view_angle_rad)},
-                       {"stray", optionalJson(validation.stray_share)}};
-}
-
 /// Null when patches were not even measured.
 Json
 validationJson(const std::optional<ValidationOptions>& validation)
@@ -224,74 +200,167 @@ optionsJson(const PatchReport& report)
           {"validation", validationJson(report.options.validation)}};
 }
 
-/// The names of those that are set.
-Json
-flagsJson(const FitFlags& flags)
+/// What is the same for all patches of a type, as text.
+struct TypeText {
+  std::string type; ///< members "surface" to "names"
+  std::string state_names;
+};
+
+TypeText
+makeTypeText(PatchType type)
 {
-  Json names = Json::array();
-  for (const auto& [name, flag] : kFitFlagNames)
-    if (flags.*flag)
-      names.push_back(name);
-  return names;
+  const Json members = {{"surface", surfaceName(type.surface)},
+                        {"boundary", boundaryName(type.boundary)},
+                        {"dof", degreesOfFreedom(type)},
+                        {"names", parameterNames(type)}};
+  const std::string object = members.dump();
+  return {object.substr(1, object.size() - 2), Json(stateNames(type)).dump()};
 }
 
-Json
-patchJson(const ExtractedPatch& extracted, const PatchReport& report)
+const TypeText&
+typeText(PatchType type)
 {
-  const FitResult& fit = extracted.fit;
-  const PatchType type = fit.patch.type;
-  const bool second_order = fit.mean_shift.size() > 0;
-  const CovarianceMode mode = report.options.covariance != CovarianceMode::Auto ?
-                                  report.options.covariance :
-                              second_order ? CovarianceMode::SecondOrder :
-                                             CovarianceMode::Exact;
+  static const std::array<TypeText, kPatchTypes.size()> texts = [] {
+    std::array<TypeText, kPatchTypes.size()> made;
+    std::transform(kPatchTypes.begin(), kPatchTypes.end(), made.begin(), makeTypeText);
+    return made;
+  }();
+  const auto* at = std::find(kPatchTypes.begin(), kPatchTypes.end(), type);
+  return texts.at(static_cast<std::size_t>(at - kPatchTypes.begin()));
+}
+
+/// The names of those that are set.
+void
+addFlags(const FitFlags& flags, io::JsonObject& json)
+{
+  std::string& out = json.member("flags");
+  char before = '[';
+  for (const auto& [name, flag] : kFitFlagNames)
+    if (flags.*flag) {
+      out += before;
+      io::appendJson(name, out);
+      before = ',';
+    }
+  out += before == '[' ? "[]" : "]";
+}
+
+CovarianceMode
+modeOf(const FitResult& fit, const ExtractionOptions& options)
+{
+  if (options.covariance != CovarianceMode::Auto)
+    return options.covariance;
+  return fit.mean_shift.size() > 0 ? CovarianceMode::SecondOrder :
+                                     CovarianceMode::Exact;
+}
+
+void
+addEstimate(const FitResult& fit, const PatchReport& report, io::JsonObject& json)
+{
+  const TypeText& text = typeText(fit.patch.type);
   Patch in_file = fit.patch;
   in_file.c += report.offset;
   PatchState state = fit.state;
   state.centre += report.offset;
-  Json seed;
-  if (extracted.seed_index)
-    seed = {{"index", *extracted.seed_index},
-            {"point", vectorJson(extracted.seed + report.offset)}};
-  Json json{{"surface", surfaceName(type.surface)},
-            {"boundary", boundaryName(type.boundary)},
-            {"dof", degreesOfFreedom(type)},
-            {"names", parameterNames(type)},
-            {"parameters", vectorJson(pack(in_file))},
-            {"covariance", matrixJson(observableCovariance(fit))},
-            {"flags", flagsJson(fit.flags)},
-            {"nonlinearity", fit.nonlinearity},
-            {"state", vectorJson(pack(state))},
-            {"state_names", stateNames(type)},
-            {"state_covariance", matrixJson(fit.state_covariance)},
-            {"state_frame", matrixJson(state.frame())},
-            {"covariance_mode", covarianceModeName(mode)},
-            {"status", statusName(fit.status)},
-            {"points", fit.points},
-            {"uninformative_points", fit.uninformative_points},
-            {"chi2", fit.chi2},
-            {"chi2_dof", fit.chi2_dof},
-            {"chi2_expected", fit.chi2_expected},
-            {"iterations", fit.iterations},
-            {"verdict", Json()},
-            {"residual", Json()},
-            {"coverage", Json()},
-            {"measured", Json()},
-            {"second_attempt", extracted.is_second_attempt},
-            {"seed", seed},
-            {"radius", extracted.radius_m > 0.0 ? Json(extracted.radius_m) : Json()}};
-  if (extracted.validation)
-    writeMeasured(*extracted.validation, json);
-  if (second_order) {
-    json["mean_shift"] = vectorJson(fit.mean_shift);
-    json["state_mean_shift"] = vectorJson(fit.state_mean_shift);
+  json.addText(text.type);
+  json.add("parameters", pack(in_file));
+  json.addMatrix("covariance", observableCovariance(fit));
+  addFlags(fit.flags, json);
+  json.add("nonlinearity", fit.nonlinearity);
+  json.add("state", pack(state));
+  json.member("state_names") += text.state_names;
+  json.addMatrix("state_covariance", fit.state_covariance);
+  json.addMatrix("state_frame", state.frame());
+  json.add("covariance_mode", covarianceModeName(modeOf(fit, report.options)));
+  json.add("status", statusName(fit.status));
+  json.add("points", fit.points);
+  json.add("uninformative_points", fit.uninformative_points);
+  json.add("chi2", fit.chi2);
+  json.add("chi2_dof", fit.chi2_dof);
+  json.add("chi2_expected", fit.chi2_expected);
+  json.add("iterations", fit.iterations);
+}
+
+void
+addOptional(const char* name, std::optional<double> value, io::JsonObject& json)
+{
+  if (value)
+    json.add(name, *value);
+  else
+    json.addNull(name);
+}
+
+/// The verdict and what it is about, but for chi-square, which is the fit's.
+void
+addValidation(const std::optional<Validation>& validation, io::JsonObject& json)
+{
+  if (!validation) {
+    for (const char* name : {"verdict", "residual", "coverage", "measured"})
+      json.addNull(name);
+    return;
+  }
+  json.add("verdict", verdictName(validation->verdict));
+  io::JsonObject residual(json.member("residual"));
+  residual.add("rms", validation->residual.rms_m);
+  residual.add("largest", validation->residual.largest_m);
+  residual.add("unexplained", validation->residual.unexplained_m);
+  residual.end();
+  json.add("coverage", validation->coverage.share);
+  io::JsonObject measured(json.member("measured"));
+  measured.add("extent", validation->extent_m);
+  measured.add("sagitta", validation->sagitta_m);
+  measured.add("curvature", validation->curvature_per_m);
+  measured.add("noise", validation->noise_m);
+  addOptional("view_angle", validation->view_angle_rad, measured);
+  addOptional("stray", validation->stray_share, measured);
+  measured.end();
+}
+
+void
+addOrigin(const ExtractedPatch& extracted,
+          const Eigen::Vector3d& offset,
+          io::JsonObject& json)
+{
+  json.add("second_attempt", extracted.is_second_attempt);
+  if (extracted.seed_index) {
+    io::JsonObject seed(json.member("seed"));
+    seed.add("index", *extracted.seed_index);
+    seed.add("point", extracted.seed + offset);
+    seed.end();
+  }
+  else
+    json.addNull("seed");
+  if (extracted.radius_m > 0.0)
+    json.add("radius", extracted.radius_m);
+  else
+    json.addNull("radius");
+}
+
+/// What only some patches have.
+void
+addParts(const FitResult& fit, io::JsonObject& json)
+{
+  if (fit.mean_shift.size() > 0) {
+    json.add("mean_shift", fit.mean_shift);
+    json.add("state_mean_shift", fit.state_mean_shift);
   }
   if (fit.white_state_covariance.size() > 0) {
     const StateMatrix pattern = fit.state_covariance - fit.white_state_covariance;
-    json["state_covariance_white"] = matrixJson(fit.white_state_covariance);
-    json["state_covariance_pattern"] = matrixJson(pattern);
+    json.addMatrix("state_covariance_white", fit.white_state_covariance);
+    json.addMatrix("state_covariance_pattern", pattern);
   }
-  return json;
+}
+
+void
+appendPatch(const ExtractedPatch& extracted,
+            const PatchReport& report,
+            std::string& out)
+{
+  io::JsonObject json(out);
+  addEstimate(extracted.fit, report, json);
+  addValidation(extracted.validation, json);
+  addOrigin(extracted, report.offset, json);
+  addParts(extracted.fit, json);
+  json.end();
 }
 
 Json
@@ -313,6 +382,54 @@ rejectedJson(const ExtractionResult& result)
   for (const auto& [verdict, count] : result.turned_down)
     json[std::string(verdictName(verdict))] = count;
   return json;
+}
+
+/// The patches [begin, end), of which all but the very first follow another.
+std::string
+patchesText(const PatchReport& report,
+            std::size_t begin,
+            std::size_t end,
+            std::string_view between)
+{
+  std::string text;
+  for (std::size_t i = begin; i < end; ++i) {
+    if (i > 0)
+      text += between;
+    appendPatch(report.result.patches[i], report, text);
+  }
+  return text;
+}
+
+/// Round after round, so that the text of all patches never has to be in memory: some
+/// threads print while one writes what the last round printed. The text does not depend
+/// on their number.
+void
+writePatches(std::ostream& out, const PatchReport& report, std::string_view between)
+{
+  constexpr std::size_t kPatches = 64; // of one piece of work
+  const std::size_t count = report.result.patches.size();
+  const std::size_t blocks = (count + kPatches - 1) / kPatches;
+  const auto at_once =
+      static_cast<std::size_t>(8 * threadCount(report.options.threads));
+  std::vector<std::string> printed, texts;
+  for (std::size_t first = 0; first < blocks || !printed.empty(); first += at_once) {
+    texts.assign(first < blocks ? std::min(at_once, blocks - first) : 0, {});
+    const auto work = [&](int item, int) {
+      if (item == 0) {
+        for (const std::string& text : printed)
+          out << text;
+        return;
+      }
+      const std::size_t slot = static_cast<std::size_t>(item) - 1;
+      const std::size_t begin = (first + slot) * kPatches;
+      texts[slot] =
+          patchesText(report, begin, std::min(begin + kPatches, count), between);
+    };
+    const auto items = static_cast<int>(texts.size()) + 1;
+    // Threads take longer to start than few patches to print.
+    parallelFor(items, count <= kPatches ? 1 : report.options.threads, work);
+    printed.swap(texts);
+  }
 }
 
 /// File names need not be UTF-8; JSON must.
@@ -610,11 +727,7 @@ writeJson(std::ostream& out, const PatchReport& report, JsonLayout layout)
   member("notices", report.result.notices);
   member("options", optionsJson(report));
   out << "\"patches\":[" << gap;
-  for (std::size_t i = 0; i < report.result.patches.size(); ++i)
-    out << (i == 0   ? "" :
-            one_line ? "," :
-                       ",\n")
-        << text(patchJson(report.result.patches[i], report));
+  writePatches(out, report, one_line ? "," : ",\n");
   out << gap << "]," << gap;
   member("rejected", rejectedJson(report.result));
   out << "\"timing\":" << text(timingJson(report)) << gap << "}\n";
@@ -686,22 +799,12 @@ writePatchPoints(std::ostream& out,
   const pcl::PointCloud<PatchPoint> cloud = toPatchCloud(patches, sensor_pose);
   pcl::PCLPointCloud2 fields;
   pcl::toPCLPointCloud2(cloud, fields);
-  // Not straight to `out`: PCL changes a stream's locale, which makes a std::ofstream
-  // on a full disk throw std::bad_cast.
-  std::ostringstream pcd;
-  const int failed = pcl::PCDWriter().writeBinaryCompressed(pcd,
-                                                            fields,
-                                                            cloud.sensor_origin_,
-                                                            cloud.sensor_orientation_);
-  if (failed != 0)
-    out.setstate(std::ios::failbit);
-  if (failed == 0 && !offset.isZero(0.0))
+  if (!offset.isZero(0.0))
     out << fmt::format("# add {} {} {} m to x y z: single precision cannot hold them\n",
                        offset.x(),
                        offset.y(),
                        offset.z());
-  if (failed == 0)
-    out << pcd.str();
+  io::writePcdCompressed(out, fields, cloud.sensor_origin_, cloud.sensor_orientation_);
 }
 
 std::array<std::uint8_t, 3>

@@ -12,8 +12,7 @@
 /// - a compressed block of another size than the header announces;
 /// - more points than LoadOptions::max_points.
 #include "cloud_readers.h"
-
-#include <pcl/io/lzf.h>
+#include "lzf.h"
 
 #include <Eigen/Geometry>
 
@@ -21,6 +20,7 @@
 #include <array>
 #include <cctype>
 #include <cmath>
+#include <memory>
 
 #include <fmt/format.h>
 
@@ -262,6 +262,12 @@ struct WantedFields {
   const Field* y = nullptr;
   const Field* z = nullptr;
   const Field* covariance = nullptr;
+  const Field* color = nullptr; ///< where the caller asks for it
+
+  std::array<const Field*, 5> all() const
+  {
+    return {x, y, z, covariance, color};
+  }
 };
 
 /// The field of this name; in capitals, when there is none in small letters.
@@ -283,13 +289,25 @@ fieldNamed(const Header& header, const std::string& name)
   return found;
 }
 
+/// Red, green and blue in one value of four bytes, as PCL packs them.
+const Field*
+colorField(const Header& header)
+{
+  for (const Field& field : header.fields)
+    if ((field.name == "rgb" || field.name == "rgba") && field.count == 1 &&
+        field.type.size == 4)
+      return &field;
+  return nullptr;
+}
+
 WantedFields
-wantedFields(const Header& header)
+wantedFields(const Header& header, const LoadOptions& options)
 {
   const WantedFields wanted{fieldNamed(header, "x"),
                             fieldNamed(header, "y"),
                             fieldNamed(header, "z"),
-                            fieldNamed(header, "covariance")};
+                            fieldNamed(header, "covariance"),
+                            options.colors ? colorField(header) : nullptr};
   for (const Field* field : {wanted.x, wanted.y, wanted.z}) {
     if (field == nullptr)
       throw std::runtime_error("has no fields x, y and z");
@@ -335,41 +353,147 @@ covarianceOf(const Number& number, std::uint64_t count, std::size_t point)
   return s.cast<float>();
 }
 
-/// Fills the cloud from `value(field, point, element)`.
-template <typename Value>
+/// Where the values of a field are.
+struct Column {
+  const char* first = nullptr;
+  std::size_t stride = 0; ///< bytes from point to point
+  ScalarType type;
+
+  const char* at(std::size_t point, std::size_t element = 0) const
+  {
+    return first + point * stride + element * static_cast<std::size_t>(type.size);
+  }
+
+  double value(std::size_t point, std::size_t element = 0) const
+  {
+    return type.read(at(point, element));
+  }
+};
+
+using Axes = std::array<Column, 3>;
+
+/// Appends n points from coordinate(axis, point); by blocks, since to append one by one
+/// takes longer than to read them.
+template <typename Coordinate>
 void
-fillPoints(const WantedFields& wanted, bool ascii, const Value& value, RawCloud& cloud)
+appendPoints(std::size_t n, const Coordinate& coordinate, RawCloud& cloud)
 {
-  auto& points = *cloud.points;
-  const double unit = cloud.info.unit_m;
-  const std::array<const Field*, 3> axes{wanted.x, wanted.y, wanted.z};
-  if (exceedFloat(wanted, ascii)) {
-    std::vector<double> xyz(3 * points.size());
-    for (std::size_t i = 0; i < xyz.size(); ++i)
-      xyz[i] = unit * value(*axes[i % 3], i / 3, 0);
-    placePoints(xyz, cloud);
-  }
-  else {
-    for (std::size_t i = 0; i < points.size(); ++i)
+  std::array<pcl::PointXYZ, 256> block;
+  auto& points = cloud.points->points;
+  points.reserve(n);
+  for (std::size_t first = 0; first < n; first += block.size()) {
+    const std::size_t count = std::min(block.size(), n - first);
+    for (std::size_t i = 0; i < count; ++i)
       for (std::size_t k = 0; k < 3; ++k)
-        points[i].data[k] = static_cast<float>(unit * value(*axes[k], i, 0));
+        block[i].data[k] = coordinate(k, first + i);
+    points.insert(points.end(), block.data(), block.data() + count);
   }
-  if (wanted.covariance == nullptr)
-    return;
-  cloud.covariances.resize(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i)
-    cloud.covariances[i] = covarianceOf(
-        [&](std::size_t k) { return unit * unit * value(*wanted.covariance, i, k); },
-        wanted.covariance->count,
-        i);
+}
+
+/// Single precision stays what it is.
+template <typename Scale>
+void
+appendFloats(const Axes& xyz, std::size_t n, const Scale& scale, RawCloud& cloud)
+{
+  appendPoints(
+      n,
+      [&xyz, &scale](std::size_t k, std::size_t i) {
+        float value;
+        std::memcpy(&value, xyz[k].at(i), sizeof(value));
+        return scale(value);
+      },
+      cloud);
 }
 
 void
-resize(RawCloud& cloud, const Header& header)
+fillPositions(const Axes& xyz, std::size_t n, bool exceed_float, RawCloud& cloud)
 {
-  cloud.points->resize(header.points);
+  const double unit = cloud.info.unit_m;
+  const auto in_m = [unit](double value) { return static_cast<float>(unit * value); };
+  const bool all_floats = std::all_of(xyz.begin(), xyz.end(), [](const Column& column) {
+    return column.type.kind == 'F' && column.type.size == 4;
+  });
+  if (exceed_float) {
+    std::vector<double> values(3 * n);
+    for (std::size_t i = 0; i < values.size(); ++i)
+      values[i] = unit * xyz[i % 3].value(i / 3);
+    cloud.points->points.resize(n);
+    placePoints(values, cloud);
+  }
+  else if (all_floats && unit == 1.0)
+    appendFloats(
+        xyz,
+        n,
+        [](float value) { return value; },
+        cloud);
+  else if (all_floats)
+    appendFloats(xyz, n, in_m, cloud);
+  else
+    appendPoints(
+        n,
+        [&](std::size_t k, std::size_t i) { return in_m(xyz[k].value(i)); },
+        cloud);
+}
+
+void
+fillCovariances(const Column& covariance, std::uint64_t count, RawCloud& cloud)
+{
+  const double unit = cloud.info.unit_m;
+  cloud.covariances.resize(cloud.points->size());
+  for (std::size_t i = 0; i < cloud.covariances.size(); ++i)
+    cloud.covariances[i] = covarianceOf(
+        [&](std::size_t k) { return unit * unit * covariance.value(i, k); },
+        count,
+        i);
+}
+
+/// A field of floats holds the bits of the colour, one of integers its value.
+std::uint32_t
+packedColor(const Field& field, const Column& color, std::size_t point)
+{
+  std::uint32_t bits = 0;
+  if (field.type.kind != 'F')
+    return static_cast<std::uint32_t>(static_cast<std::int64_t>(color.value(point)));
+  if (color.type.size == 4) { // of which many are NaN: no arithmetic
+    std::memcpy(&bits, color.at(point), sizeof(bits));
+    return bits;
+  }
+  const auto number = static_cast<float>(color.value(point)); // of text
+  std::memcpy(&bits, &number, sizeof(bits));
+  return bits;
+}
+
+void
+fillColors(const Field& field, const Column& color, RawCloud& cloud)
+{
+  auto& colors = cloud.info.colors;
+  colors.resize(cloud.points->size());
+  for (std::size_t i = 0; i < colors.size(); ++i) {
+    const std::uint32_t bits = packedColor(field, color, i);
+    for (std::size_t k = 0; k < 3; ++k)
+      colors[i][k] = static_cast<std::uint8_t>(bits >> (16U - 8U * k) & 0xffU);
+  }
+}
+
+/// Fills the cloud from `column(field)`.
+template <typename ColumnOf>
+void
+fillCloud(const Header& header,
+          const WantedFields& wanted,
+          bool ascii,
+          const ColumnOf& column,
+          RawCloud& cloud)
+{
   cloud.points->width = static_cast<std::uint32_t>(header.width);
   cloud.points->height = static_cast<std::uint32_t>(header.height);
+  fillPositions({column(*wanted.x), column(*wanted.y), column(*wanted.z)},
+                header.points,
+                exceedFloat(wanted, ascii),
+                cloud);
+  if (wanted.covariance != nullptr)
+    fillCovariances(column(*wanted.covariance), wanted.covariance->count, cloud);
+  if (wanted.color != nullptr)
+    fillColors(*wanted.color, column(*wanted.color), cloud);
 }
 
 /// The numbers of text that are used, row by row; one row per point.
@@ -387,7 +511,7 @@ wantedColumns(const Header& header, const WantedFields& wanted)
 {
   Table table;
   table.slots.assign(header.columns, -1);
-  for (const Field* field : {wanted.x, wanted.y, wanted.z, wanted.covariance})
+  for (const Field* field : wanted.all())
     for (std::uint64_t k = 0; field != nullptr && k < field->count; ++k)
       table.slots[field->column + k] = static_cast<int>(table.row_values++);
   return table;
@@ -472,14 +596,15 @@ readAscii(std::string_view data,
   Table table = wantedColumns(header, wanted);
   for (const std::string& notice : parseRows(data, header.points, table))
     cloud.info.notices.push_back(notice);
-  resize(cloud, header);
-  fillPoints(
+  fillCloud(
+      header,
       wanted,
       true,
-      [&](const Field& field, std::size_t i, std::size_t element) {
-        return table
-            .values[i * table.row_values +
-                    static_cast<std::size_t>(table.slots[field.column + element])];
+      [&table](const Field& field) {
+        const double* first = table.values.data() + table.slots[field.column];
+        return Column{reinterpret_cast<const char*>(first),
+                      table.row_values * sizeof(double),
+                      ScalarType{'F', sizeof(double)}};
       },
       cloud);
 }
@@ -528,19 +653,18 @@ readBinary(std::string_view data,
                     header.points,
                     header.point_bytes));
   judgeSurplus(data.substr(*expected), header, cloud);
-  resize(cloud, header);
-  fillPoints(
+  fillCloud(
+      header,
       wanted,
       false,
-      [&](const Field& field, std::size_t i, std::size_t element) {
-        return field.type.read(data.data() + i * header.point_bytes + field.offset +
-                               element * static_cast<std::size_t>(field.type.size));
+      [&](const Field& field) {
+        return Column{data.data() + field.offset, header.point_bytes, field.type};
       },
       cloud);
 }
 
 /// Two sizes of 32 bits, then the LZF stream. `data` is left at what follows.
-std::vector<char>
+std::unique_ptr<char[]>
 decompress(std::string_view& data, std::uint64_t expected)
 {
   constexpr std::size_t kSizes = 8;
@@ -557,13 +681,8 @@ decompress(std::string_view& data, std::uint64_t expected)
   if (uncompressed != expected || uncompressed / 88 > compressed)
     throw std::runtime_error("corrupt: compressed data of another size than the header "
                              "announces");
-  std::vector<char> plain(uncompressed);
-  const unsigned int length =
-      pcl::lzfDecompress(data.data(),
-                         static_cast<unsigned int>(compressed),
-                         plain.data(),
-                         static_cast<unsigned int>(uncompressed));
-  if (length != uncompressed)
+  std::unique_ptr<char[]> plain(new char[uncompressed]); // not zeros first
+  if (!lzfDecompress(data.substr(0, compressed), plain.get(), uncompressed))
     throw std::runtime_error("corrupt: compressed data cannot be unpacked");
   data.remove_prefix(compressed);
   return plain;
@@ -579,16 +698,16 @@ readCompressed(std::string_view data,
   const auto expected = product(header.points, header.point_bytes);
   if (!expected || *expected > 0xffffffffU)
     corrupt("more data than compression allows");
-  const std::vector<char> plain = decompress(data, *expected);
+  const std::unique_ptr<char[]> plain = decompress(data, *expected);
   noteSurplus(data, cloud);
-  resize(cloud, header);
-  fillPoints(
+  fillCloud(
+      header,
       wanted,
       false,
-      [&](const Field& field, std::size_t i, std::size_t element) {
-        return field.type.read(plain.data() + field.offset * header.points +
-                               i * field.bytes() +
-                               element * static_cast<std::size_t>(field.type.size));
+      [&](const Field& field) {
+        return Column{plain.get() + field.offset * header.points,
+                      field.bytes(),
+                      field.type};
       },
       cloud);
 }
@@ -599,7 +718,7 @@ RawCloud
 readPcd(std::string_view bytes, const LoadOptions& options)
 {
   Header header = parseHeader(bytes);
-  const WantedFields wanted = wantedFields(header);
+  const WantedFields wanted = wantedFields(header, options);
   if (header.points == 0)
     throw std::runtime_error("holds no points");
   checkPointCount(header.points, options.max_points);

@@ -329,11 +329,29 @@ struct Reading {
   std::vector<std::int64_t> grid; ///< of range_grid: the vertex of each cell, or -1
 };
 
+/// The second three of the properties are there, of one byte each.
+bool
+hasColors(const Element& element, const std::array<int, 6>& wanted)
+{
+  return std::all_of(wanted.begin() + 3, wanted.end(), [&element](int index) {
+    return index >= 0 &&
+           element.properties[static_cast<std::size_t>(index)].type.kind == 'U' &&
+           element.properties[static_cast<std::size_t>(index)].type.size == 1;
+  });
+}
+
+/// Text may hold anything.
+std::uint8_t
+channel(double value)
+{
+  return value >= 0.0 && value <= 255.0 ? static_cast<std::uint8_t>(value) : 0;
+}
+
 void
 readVertices(NumberSource& source, const Element& element, Reading& reading)
 {
-  const auto wanted = indicesOf<3>(element, {"x", "y", "z"});
-  if (std::find(wanted.begin(), wanted.end(), -1) != wanted.end())
+  auto wanted = indicesOf<6>(element, {"x", "y", "z", "red", "green", "blue"});
+  if (std::find(wanted.begin(), wanted.begin() + 3, -1) != wanted.begin() + 3)
     throw std::runtime_error("has no properties x, y and z");
   if (element.count > 0x7fffffffU)
     corrupt("an impossible number of vertices");
@@ -341,11 +359,19 @@ readVertices(NumberSource& source, const Element& element, Reading& reading)
   if (!cloud.points->empty())
     corrupt("two elements vertex");
   checkPointCount(element.count, reading.options.max_points);
+  const bool colored = reading.options.colors && hasColors(element, wanted);
+  if (!colored)
+    std::fill(wanted.begin() + 3, wanted.end(), -1); // need not be numbers
   std::vector<double> xyz;
   xyz.reserve(3 * element.count);
-  for (std::uint64_t i = 0; i < element.count; ++i)
-    for (const double value : readRow(source, element, wanted))
-      xyz.push_back(reading.options.unit_m * value);
+  cloud.info.colors.reserve(colored ? element.count : 0);
+  for (std::uint64_t i = 0; i < element.count; ++i) {
+    const auto row = readRow(source, element, wanted);
+    for (std::size_t k = 0; k < 3; ++k)
+      xyz.push_back(reading.options.unit_m * row[k]);
+    if (colored)
+      cloud.info.colors.push_back({channel(row[3]), channel(row[4]), channel(row[5])});
+  }
   cloud.points->resize(element.count);
   placePoints(xyz, cloud);
   for (const Property& property : element.properties)
@@ -451,6 +477,9 @@ fillGrid(const std::vector<std::int64_t>& grid, RawCloud& cloud)
   const float nan = std::numeric_limits<float>::quiet_NaN();
   std::vector<bool> is_used(vertices.size(), false);
   cloud.points->assign(grid.size(), pcl::PointXYZ(nan, nan, nan));
+  auto& colors = cloud.info.colors;
+  const auto vertex_colors = colors;
+  colors.assign(vertex_colors.empty() ? 0 : grid.size(), {});
   for (std::size_t cell = 0; cell < grid.size(); ++cell) {
     if (grid[cell] < 0)
       continue;
@@ -458,6 +487,8 @@ fillGrid(const std::vector<std::int64_t>& grid, RawCloud& cloud)
     if (vertex >= vertices.size())
       throw std::runtime_error("corrupt: range_grid names a vertex that is not there");
     (*cloud.points)[cell] = vertices[vertex];
+    if (!colors.empty())
+      colors[cell] = vertex_colors[vertex];
     is_used[vertex] = true;
   }
   const auto lost = std::count(is_used.begin(), is_used.end(), false);

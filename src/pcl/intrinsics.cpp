@@ -209,7 +209,7 @@ chooseSensorPose(const pcl::PointCloud<pcl::PointXYZ>::ConstPtr& points,
                  std::string* notice)
 {
   const bool has_position = !file_pose.c.isZero(0.0);
-  if (has_position || isTakenFrom({points, {}, file_pose}) ||
+  if (has_position || isIdentity(file_pose) || isTakenFrom({points, {}, file_pose}) ||
       !isTakenFrom({points, {}, Pose{}}))
     return file_pose;
   if (notice != nullptr)

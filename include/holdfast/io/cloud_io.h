@@ -4,6 +4,7 @@
 #include <holdfast/pcl/range_cloud.h>
 #include <holdfast/sensor/camera.h>
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -49,6 +50,9 @@ struct LoadOptions {
   std::optional<Pose> sensor_pose;
   std::optional<Eigen::Vector3d> viewpoint;
 
+  /// Keep the colours of the points, in CloudFileInfo::colors.
+  bool colors = false;
+
   /// A file that announces more points is an error, before anything is unpacked.
   std::uint64_t max_points = 50000000;
 };
@@ -68,6 +72,9 @@ struct CloudFileInfo {
   int zero_points = 0; ///< taken as invalid: 0 0 0 stands for "no return"
   int out_of_range_pixels = 0; ///< taken as invalid
   std::vector<std::string> notices; ///< one line each: what the reader had to decide
+  /// Red, green, blue of every point, where the caller asked for them and a PCD has rgb
+  /// or rgba, a PLY red, green and blue of one byte each; else empty.
+  std::vector<std::array<std::uint8_t, 3>> colors;
 };
 
 /// Reads PCD (ascii, binary, binary_compressed, v0.5 and newer), PLY (ascii, binary,

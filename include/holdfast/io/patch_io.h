@@ -59,9 +59,11 @@ void writeMesh(std::ostream& out,
                const Eigen::Vector3d& offset = Eigen::Vector3d::Zero());
 
 /// Writes the patches, one at least, as a compressed PCD of PatchPoint, which PCL and
-/// its tools read. Sets the fail bit when that does not work. The points stay in the
-/// frame of the cloud's points, which single precision can hold; a comment at the top
-/// names the offset that takes them to that of the file, if there is one.
+/// its tools read. The points stay in the frame of the cloud's points, which single
+/// precision can hold; a comment at the top names the offset that takes them to that of
+/// the file, if there is one.
+/// \throw std::length_error when they are more than such a file can hold, some 5
+/// million.
 void writePatchPoints(std::ostream& out,
                       const std::vector<ExtractedPatch>& patches,
                       const Pose& sensor_pose,
