@@ -161,9 +161,11 @@ FitOptions
 fitOptionsOf(Around around)
 {
   FitOptions options;
-  options.surface =
-      around == Around::Rocks ? SurfaceRequest::Paraboloid : SurfaceRequest::Plane;
-  options.plane_boundary = BoundaryType::Circle;
+  options.surface = SurfaceRequest::Paraboloid;
+  if (around != Around::Rocks) {
+    options.surface = SurfaceRequest::Plane;
+    options.plane_boundary = BoundaryType::Circle;
+  }
   return options;
 }
 
