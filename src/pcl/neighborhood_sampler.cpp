@@ -2,6 +2,7 @@
 
 #include "sampling_budget.h"
 
+#include "ball_grid.h"
 #include "path_search.h"
 #include "pixel_disc.h"
 #include "seeds.h"
@@ -78,15 +79,12 @@ struct NeighborhoodSampler::Impl {
                  Scratch& scratch,
                  std::vector<int>& indices) const;
   void disc(int seed, Scratch& scratch, std::vector<int>& indices) const;
-  void ball(int seed, Scratch& scratch, std::vector<int>& indices) const;
+  void ball(int seed, std::vector<int>& indices) const;
   void geodesic(int seed, Scratch& scratch, std::vector<int>& indices) const;
   void knn(int seed, Scratch& scratch, std::vector<int>& indices) const;
 
   void gridBall(int seed, std::vector<int>& indices) const;
-  void treeBall(int seed,
-                double radius,
-                Scratch& scratch,
-                std::vector<int>& indices) const;
+  void pointsWithin(int seed, double radius, std::vector<int>& indices) const;
   void gridGeodesic(int seed, Scratch& scratch, std::vector<int>& indices) const;
   void treeGeodesic(int seed, Scratch& scratch, std::vector<int>& indices) const;
 
@@ -104,7 +102,8 @@ struct NeighborhoodSampler::Impl {
   NoiseModel::ConstPtr noise;
   SamplerOptions options;
   std::optional<PixelGrid> grid;
-  pcl::KdTreeFLANN<pcl::PointXYZ> tree{false};
+  std::optional<BallGrid> balls; ///< without a pixel grid
+  pcl::KdTreeFLANN<pcl::PointXYZ> tree{false}; ///< for the nearest points
 };
 
 namespace {
@@ -131,7 +130,10 @@ NeighborhoodSampler::Impl::Impl(const RangeCloud& the_cloud,
   if (!noise)
     throw std::invalid_argument("the sensor has no noise model");
   grid = makePixelGrid(cloud, the_sensor);
-  if (!grid || options.neighborhood == Neighborhood::Knn)
+  const bool nearest = options.neighborhood == Neighborhood::Knn;
+  if (!grid && !nearest)
+    balls.emplace(points, validPoints(), options.radius_m);
+  if (nearest || (!grid && options.neighborhood == Neighborhood::Geodesic))
     buildTree();
 }
 
@@ -229,7 +231,7 @@ NeighborhoodSampler::Impl::patch(int seed,
                  scratch.patch,
                  indices);
   else if (noise->isOmnidirectional() || inCamera(seed).z() <= 0.0)
-    treeBall(seed, options.radius_m, scratch, indices);
+    pointsWithin(seed, options.radius_m, indices);
   else
     treePatch(seed, settings, scratch, indices);
 }
@@ -244,7 +246,7 @@ NeighborhoodSampler::Impl::treePatch(int seed,
   // noise puts points off by some sigmas.
   constexpr double kMargin = 1.15, kSigmas = 4.0;
   const double sigma = depthSigma(seed);
-  treeBall(seed, kMargin * options.radius_m + kSigmas * sigma, scratch, indices);
+  pointsWithin(seed, kMargin * options.radius_m + kSigmas * sigma, indices);
   scratch.candidates.clear();
   for (const int i : indices)
     scratch.candidates.push_back(inCamera(i));
@@ -270,14 +272,12 @@ NeighborhoodSampler::Impl::disc(int seed,
 }
 
 void
-NeighborhoodSampler::Impl::ball(int seed,
-                                Scratch& scratch,
-                                std::vector<int>& indices) const
+NeighborhoodSampler::Impl::ball(int seed, std::vector<int>& indices) const
 {
   if (grid)
     gridBall(seed, indices);
   else
-    treeBall(seed, options.radius_m, scratch, indices);
+    pointsWithin(seed, options.radius_m, indices);
 }
 
 void
@@ -298,14 +298,11 @@ NeighborhoodSampler::Impl::gridBall(int seed, std::vector<int>& indices) const
 }
 
 void
-NeighborhoodSampler::Impl::treeBall(int seed,
-                                    double radius,
-                                    Scratch& scratch,
-                                    std::vector<int>& indices) const
+NeighborhoodSampler::Impl::pointsWithin(int seed,
+                                        double radius,
+                                        std::vector<int>& indices) const
 {
-  tree.radiusSearch(points[seed], radius, scratch.found, scratch.squared_distances);
-  indices.assign(scratch.found.begin(), scratch.found.end());
-  std::sort(indices.begin(), indices.end());
+  balls->search(points[seed], radius, indices);
 }
 
 namespace {
@@ -380,7 +377,7 @@ NeighborhoodSampler::Impl::treeGeodesic(int seed,
 {
   constexpr int kNeighbors = 8;
   std::vector<int>& within = scratch.ball;
-  treeBall(seed, options.radius_m, scratch, within);
+  pointsWithin(seed, options.radius_m, within);
   const auto slotOf = [&within](int index) {
     const auto at = std::lower_bound(within.begin(), within.end(), index);
     return at != within.end() && *at == index ? static_cast<int>(at - within.begin()) :
@@ -543,9 +540,9 @@ NeighborhoodSampler::Impl::neighborhood(int seed,
   case Neighborhood::Disc:
     if (grid)
       return disc(seed, scratch, indices);
-    return treeBall(seed, options.radius_m, scratch, indices);
+    return pointsWithin(seed, options.radius_m, indices);
   case Neighborhood::Ball:
-    return ball(seed, scratch, indices);
+    return ball(seed, indices);
   case Neighborhood::Geodesic:
     return geodesic(seed, scratch, indices);
   case Neighborhood::Knn:
