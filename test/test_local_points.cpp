@@ -1,8 +1,8 @@
 // Points placed about a patch all at once lie where they do one by one.
 #include "support/random_patch.h"
 
-#include "patch/patch_rays.h"
 #include "validation/local_points.h"
+#include "validation/patch_rays.h"
 
 #include <holdfast/patch/boundary.h>
 #include <holdfast/patch/surface.h>
@@ -101,24 +101,50 @@ TEST_P(PlacedPoints, FarAwayAreNotLost)
   EXPECT_EQ(LocalPoints(patch, points).size(), 2);
 }
 
-// Rays to points of the patch meet it there; those beside it do not.
+// Seen from anywhere, as intersectRay() has it.
 TEST_P(PlacedPoints, RaysMeetThePatchAsOneByOne)
 {
-  int met = 0;
+  int met = 0, missed = 0;
+  PatchRays rays;
   for (std::uint64_t i = 0; i < kCases; ++i) {
     Random random(i);
     const Patch patch = randomPatch(random, GetParam());
-    const Eigen::Vector3d origin = patch.c + random.uniformVector(-1.0, 1.0);
-    const PatchRays rays(patch, origin);
-    for (int k = 0; k < 10; ++k) {
-      const Eigen::Vector3d direction =
-          patch.c + random.uniformVector(-0.1, 0.1) - origin;
-      const auto together = rays.meet(direction);
-      EXPECT_EQ(together, intersectRay(patch, origin, direction));
-      met += together.has_value();
+    Pose camera;
+    camera.R = random.rotation();
+    camera.c = patch.c - camera.R * random.uniformVector(0.1, 1.0);
+    std::vector<Eigen::Vector3d> directions;
+    rays.clear();
+    for (int k = 0; k < 37; ++k) {
+      const Eigen::Vector3d to =
+          camera.toLocal(patch.c + random.uniformVector(-0.1, 0.1));
+      directions.push_back(camera.R * (to / to.z()));
+      rays.add(to.x() / to.z(), to.y() / to.z(), 1.0);
+    }
+    const std::vector<double>& inverse = rays.meet(patch, camera);
+    ASSERT_EQ(inverse.size(), directions.size());
+    for (std::size_t k = 0; k < directions.size(); ++k) {
+      const auto t = intersectRay(patch, camera.c, directions[k]);
+      EXPECT_NEAR(inverse[k], t ? 1.0 / *t : 0.0, 1e-10 * std::max(1.0, inverse[k]));
+      ++(t ? met : missed);
     }
   }
   EXPECT_GT(met, 0);
+  EXPECT_GT(missed, 0);
+}
+
+TEST(PatchRays, StrayWhereTheyMeasuredSomethingElse)
+{
+  Patch plane;
+  plane.type = {SurfaceType::Plane, BoundaryType::Circle};
+  plane.c = {0.0, 0.0, 2.0};
+  plane.d[0] = 0.1;
+  PatchRays rays;
+  for (const double inverse : {0.5, 0.5, 0.5, 0.4})
+    rays.add(0.0, 0.0, inverse);
+  rays.add(0.2, 0.0, 3.0); // beside the patch
+  EXPECT_EQ(rays.strayShare(plane, Pose(), 0.05), 0.25);
+  rays.clear();
+  EXPECT_EQ(rays.strayShare(plane, Pose(), 0.05), 0.0);
 }
 
 INSTANTIATE_TEST_SUITE_P(AllTypes,

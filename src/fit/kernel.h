@@ -233,6 +233,16 @@ struct Kernel {
                       const PatchForm& patch,
                       const PlacedPoints& out);
 
+  /// intersectRay() (patch/surface.h) from the origin of the coordinates along (x, y,
+  /// 1), for `count` rays, a multiple of PointBatch::kLaneMultiple: 1/t; zero where the
+  /// patch is missed. \param curvature of round surfaces, else 0.
+  void (*meetRays)(const double* x,
+                   const double* y,
+                   int count,
+                   const PatchForm& patch,
+                   double curvature,
+                   double* inverse_depth);
+
   /// sum_bb' y_b C(b - b') y_b'^T over the cells of a grid, whose covariance depends on
   /// their distance in rows and columns alone.
   /// \param out kCellRow rows of as many.

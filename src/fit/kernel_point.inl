@@ -531,6 +531,64 @@ squaredResiduals(Model model,
   forSurfaceAndResidual(model, residual, ResidualAction{points, state, out});
 }
 
+// t > 0 where o + t d of the surface lies within the bounds, else `instead`.
+HOLDFAST_INLINE Number
+meetAt(const PatchForm& patch,
+       double curvature,
+       const double o[3],
+       const Number d[3],
+       Number t,
+       Number instead)
+{
+  const Number x = t * d[0] + o[0], y = t * d[1] + o[1], z = t * d[2] + o[2];
+  const Number edge(BoundaryForm::kEdge), one(1.0 + 1e-12), zero(0.0);
+  // Beyond the equator the surface is none of the patch's.
+  Number found = selectLess(edge, reachOf(patch.boundary, x, y), instead, t);
+  found = selectLess(one, z * curvature, instead, found);
+  return selectLess(zero, t, found, instead);
+}
+
+inline void
+meetRays(const double* x,
+         const double* y,
+         int count,
+         const PatchForm& patch,
+         double curvature,
+         double* inverse_depth)
+{
+  const double *R = patch.R, *c = patch.c, *k = patch.k;
+  double o[3], half_gradient[3], C = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    o[i] = -(R[i] * c[0] + R[3 + i] * c[1] + R[6 + i] * c[2]);
+    half_gradient[i] = k[i] * o[i] - (i == 2 ? 1.0 : 0.0);
+    C += k[i] * o[i] * o[i];
+  }
+  C -= 2.0 * o[2];
+  for (int i = 0; i < count; i += kLanes) {
+    const Number ray[3] = {load(x + i), load(y + i), Number(1.0)};
+    Number d[3];
+    rotateIntoFrame(R, ray, d);
+    // f(o + t d) = A t^2 + 2 B t + C with f of paper eq. (1).
+    const Number A = d[0] * d[0] * k[0] + d[1] * d[1] * k[1] + d[2] * d[2] * k[2];
+    const Number B =
+        d[0] * half_gradient[0] + d[1] * half_gradient[1] + d[2] * half_gradient[2];
+    const Number zero(0.0), D = B * B - A * C;
+    const Number root = squareRoot(larger(D, zero));
+    // The root of larger magnitude does not cancel; the other one follows from their
+    // product, which covers A = 0 as well.
+    const Number q = selectLess(B, zero, root - B, zero - root - B);
+    const Number first = selectLess(q * q, Number(1e-300), zero, C / q);
+    const Number second = selectLess(A * A, Number(1e-300), first, q / A);
+    const Number near = selectLess(first, second, first, second);
+    const Number far = larger(first, second);
+    Number t = meetAt(patch, curvature, o, d, far, zero);
+    t = meetAt(patch, curvature, o, d, near, t);
+    t = selectLess(D, zero, zero, t);
+    store(selectLess(zero, t, 1.0 / larger(t, Number(1e-300)), zero),
+          inverse_depth + i);
+  }
+}
+
 // ---- Sums over the cells of a grid
 // ---------------------------------------------------
 //

@@ -13,5 +13,6 @@ makeKernel(const char* instruction_set)
           accumulateCovarianceIn,
           squaredResiduals,
           placePoints,
+          meetRays,
           sumOverCells};
 }

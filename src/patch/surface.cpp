@@ -1,5 +1,4 @@
-#include "patch_rays.h"
-
+#include <holdfast/patch/boundary.h>
 #include <holdfast/patch/surface.h>
 
 #include <algorithm>
@@ -49,6 +48,17 @@ quadraticRoots(double a, double b, double c)
   return {std::min(first, second), std::max(first, second)};
 }
 
+// True when the local point of the unbounded surface belongs to the bounded patch.
+bool
+isOnPatch(const Patch& patch, const Eigen::Vector3d& local)
+{
+  // On the sheet through the centre the local normal has no component against z.
+  if (traitsOf(patch.type.surface).is_round &&
+      patch.kappa.x() * local.z() > 1.0 + kEquatorTolerance)
+    return false;
+  return contains(patch, local.head<2>());
+}
+
 } // namespace
 
 Eigen::Vector3d
@@ -96,43 +106,23 @@ normalAt(const Patch& patch, double x, double y)
   return patch.pose().R * -gradient.normalized();
 }
 
-PatchRays::PatchRays(const Patch& patch, const Eigen::Vector3d& origin)
-: axes_(patch.pose().R.transpose())
-, origin_(axes_ * (origin - patch.c))
-, K_(implicitDiagonal(patch))
-, K_origin_(K_.cwiseProduct(origin_) - Eigen::Vector3d::UnitZ())
-, c_(origin_.dot(K_.cwiseProduct(origin_)) - 2.0 * origin_.z())
-, boundary_(patch)
-, kappa_(traitsOf(patch.type.surface).is_round ? patch.kappa.x() : 0.0)
-{}
-
-std::optional<double>
-PatchRays::meet(const Eigen::Vector3d& direction) const
-{
-  const Eigen::Vector3d d = axes_ * direction;
-  // f(o + t d) = a t^2 + 2 b t + c with f of paper eq. (1).
-  const double a = d.dot(K_.cwiseProduct(d));
-  const double b = K_origin_.dot(d);
-  for (const double t : quadraticRoots(a, b, c_))
-    if (t >= 0.0 && std::isfinite(t) && isOnPatch(origin_ + t * d))
-      return t;
-  return std::nullopt;
-}
-
-bool
-PatchRays::isOnPatch(const Eigen::Vector3d& local) const
-{
-  // On the sheet through the centre the local normal has no component against z.
-  return kappa_ * local.z() <= 1.0 + kEquatorTolerance &&
-         boundary_.contains(local.x(), local.y());
-}
-
 std::optional<double>
 intersectRay(const Patch& patch,
              const Eigen::Vector3d& origin,
              const Eigen::Vector3d& direction)
 {
-  return PatchRays(patch, origin).meet(direction);
+  const Pose pose = patch.pose();
+  const Eigen::Vector3d o = pose.toLocal(origin);
+  const Eigen::Vector3d d = pose.R.transpose() * direction;
+  const Eigen::Vector3d K = implicitDiagonal(patch);
+  // f(o + t d) = a t^2 + 2 b t + c with f of paper eq. (1).
+  const double a = d.dot(K.cwiseProduct(d));
+  const double b = o.dot(K.cwiseProduct(d)) - d.z();
+  const double c = o.dot(K.cwiseProduct(o)) - 2.0 * o.z();
+  for (const double t : quadraticRoots(a, b, c))
+    if (t >= 0.0 && std::isfinite(t) && isOnPatch(patch, o + t * d))
+      return t;
+  return std::nullopt;
 }
 
 } // namespace holdfast

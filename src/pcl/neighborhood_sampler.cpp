@@ -8,7 +8,7 @@
 #include "seeds.h"
 #include "surface_patch.h"
 
-#include "patch/patch_rays.h"
+#include "validation/patch_rays.h"
 
 #include <pcl/common/point_tests.h>
 #include <pcl/kdtree/kdtree_flann.h>
@@ -554,33 +554,24 @@ double
 NeighborhoodSampler::Impl::strayShare(int seed, const Patch& patch) const
 {
   constexpr double kPixels = 100.0, kSigmas = 4.0;
-  const Pose& pose = cloud.sensor_pose;
-  const Camera& camera = grid->camera;
-  const PixelWindow window =
-      grid->ballWindow(pose.toLocal(patch.c), patch.d.head<4>().maxCoeff());
+  const Eigen::Vector3d centre = cloud.sensor_pose.toLocal(patch.c);
+  const PixelWindow window = grid->ballWindow(centre, patch.d.head<4>().maxCoeff());
   const int columns = window.columns.end - window.columns.begin;
   const int rows = window.rows.end - window.rows.begin;
   const double pixels = static_cast<double>(columns) * rows;
   const int step = std::max(1, static_cast<int>(std::sqrt(pixels / kPixels)));
+  // Kept between patches: no allocation once it has seen the largest window.
+  thread_local PatchRays rays;
+  rays.clear();
+  for (int v = window.rows.begin + step / 2; v < window.rows.end; v += step)
+    for (int u = window.columns.begin + step / 2; u < window.columns.end; u += step)
+      if (const float depth = grid->row(v)[u]; !std::isnan(depth))
+        rays.add((u - grid->camera.cx) / grid->camera.fx,
+                 (v - grid->camera.cy) / grid->camera.fy,
+                 1.0 / depth);
   const double z = inCamera(seed).z();
   const double sigma = depthSigma(seed) / (z * z); // of 1/z
-  const PatchRays rays(patch, pose.c);
-  int seen = 0, stray = 0;
-  for (int v = window.rows.begin + step / 2; v < window.rows.end; v += step)
-    for (int u = window.columns.begin + step / 2; u < window.columns.end; u += step) {
-      const float depth = grid->row(v)[u];
-      if (std::isnan(depth))
-        continue;
-      const Eigen::Vector3d ray((u - camera.cx) / camera.fx,
-                                (v - camera.cy) / camera.fy,
-                                1.0);
-      const auto on_patch = rays.meet(pose.R * ray);
-      if (!on_patch)
-        continue;
-      ++seen;
-      stray += std::abs(1.0 / depth - 1.0 / *on_patch) > kSigmas * sigma ? 1 : 0;
-    }
-  return seen > 0 ? static_cast<double>(stray) / seen : 0.0;
+  return rays.strayShare(patch, cloud.sensor_pose, kSigmas * sigma);
 }
 
 double

@@ -9,19 +9,14 @@
 namespace holdfast {
 namespace {
 
-// Least squares for n of the monomials 1 s t ss st tt, in units in which the samples
-// spread over about one. What the coefficients explain of the sum of squares is in
-// `explained`.
+// Sums of products of the monomials 1 s t ss st tt of the samples, and of them with the
+// inverse depths less the first, so that squares keep their digits; in units in which
+// the samples spread over about one.
 template <int n>
-bool
-solve(const RaySamples& samples,
-      double scale,
-      std::array<double, 6>& h,
-      double& explained)
+Eigen::Matrix<double, n + 1, n + 1>
+sumProducts(const RaySamples& samples, double scale)
 {
-  using Matrix = Eigen::Matrix<double, n, n>;
-  using Vector = Eigen::Matrix<double, n, 1>;
-  // Row by row, which adds whole rows at a time.
+  // Column by column: Eigen's product of matrices this narrow costs twice as much.
   Eigen::Matrix<double, RaySamples::kMost, n + 1> rows;
   const int count = samples.size;
   for (int i = 0; i < count; ++i) {
@@ -29,22 +24,36 @@ solve(const RaySamples& samples,
     const double monomials[6] = {1.0, s, t, s * s, s * t, t * t};
     for (int j = 0; j < n; ++j)
       rows(i, j) = monomials[j];
-    // Less the first, so that the sums of squares keep their digits.
     rows(i, n) = samples.inverse_depth[i] - samples.inverse_depth[0];
   }
-  // Column by column: Eigen's product of matrices this narrow costs twice as much.
   const auto used = rows.topRows(count);
   Eigen::Matrix<double, n + 1, n + 1> sums;
   for (int i = 0; i <= n; ++i)
     for (int j = i; j <= n; ++j)
       sums(i, j) = sums(j, i) = used.col(i).dot(used.col(j));
+  return sums;
+}
+
+// Least squares for the first n of the monomials. What the coefficients explain of the
+// sum of squares is in `explained`.
+template <int n, int size>
+bool
+solve(const Eigen::Matrix<double, size, size>& sums,
+      const RaySamples& samples,
+      double scale,
+      std::array<double, 6>& h,
+      double& explained)
+{
+  using Matrix = Eigen::Matrix<double, n, n>;
+  using Vector = Eigen::Matrix<double, n, 1>;
   const Matrix A = sums.template topLeftCorner<n, n>();
   const Vector b = sums.template topRightCorner<n, 1>();
   const Eigen::LLT<Matrix> cholesky(A);
   // Of points on a line or a conic, rounding leaves pivots of some 1e-16.
   constexpr double kSmallestPivot = 1e-6;
   if (cholesky.info() != Eigen::Success ||
-      cholesky.matrixLLT().diagonal().cwiseAbs2().minCoeff() < kSmallestPivot * count)
+      cholesky.matrixLLT().diagonal().cwiseAbs2().minCoeff() <
+          kSmallestPivot * samples.size)
     return false;
   Vector x = cholesky.solve(b);
   explained = x.dot(b);
@@ -79,7 +88,8 @@ ReferenceSurface::fitPlane(const RaySamples& samples)
   double explained = 0.0;
   std::array<double, 6> h{};
   return samples.size >= kFew && scale > 0.0 &&
-         solve<3>(samples, scale, h, explained) && take(h);
+         solve<3>(sumProducts<3>(samples, scale), samples, scale, h, explained) &&
+         take(h);
 }
 
 bool
@@ -95,9 +105,12 @@ ReferenceSurface::fitQuadric(const RaySamples& samples, double sigma)
   const double scale = spread(samples);
   std::array<double, 6> plane{}, quadric{};
   double by_plane = 0.0, by_quadric = 0.0;
-  if (!(scale > 0.0) || !solve<3>(samples, scale, plane, by_plane))
+  if (!(scale > 0.0))
     return false;
-  const bool bends = solve<6>(samples, scale, quadric, by_quadric) &&
+  const auto sums = sumProducts<6>(samples, scale);
+  if (!solve<3>(sums, samples, scale, plane, by_plane))
+    return false;
+  const bool bends = solve<6>(sums, samples, scale, quadric, by_quadric) &&
                      by_quadric - by_plane > kSignificant * sigma * sigma;
   return take(bends ? quadric : plane);
 }
@@ -131,28 +144,32 @@ LateralDisc::LateralDisc(const ReferenceSurface& surface, double radius_m)
 , point_(surface.point())
 , normal_(surface.normal())
 , squared_radius_(radius_m * radius_m)
-{}
+{
+  // On the tangent plane rho = h0 + h1 s + h2 t, and the points are at (g t + d s) /
+  // rho from the seed's.
+  const double h0 = surface.coefficients()[0], h1 = surface.coefficients()[1];
+  const double h2 = surface.coefficients()[2];
+  const Eigen::Vector3d g = Eigen::Vector3d::UnitY() - h2 * point_;
+  const Eigen::Vector3d d = Eigen::Vector3d::UnitX() - h1 * point_;
+  const double rr = squared_radius_;
+  A_ = d.squaredNorm() - rr * h1 * h1;
+  B_ = {-rr * h0 * h1, g.dot(d) - rr * h2 * h1};
+  C_ = {-rr * h0 * h0, -2.0 * rr * h0 * h2, g.squaredNorm() - rr * h2 * h2};
+}
 
 std::pair<double, double>
 LateralDisc::chord(double t) const
 {
   constexpr double kEndless = std::numeric_limits<double>::infinity();
-  const std::array<double, 6>& h = surface_.coefficients();
-  // On the tangent plane rho = p + q s and the points are at (g + s d) / rho from the
-  // seed's, so the squared distance is a quadratic in s.
-  const double p = h[0] + h[2] * t, q = h[1];
-  const Eigen::Vector3d g = Eigen::Vector3d(ray_.x(), ray_.y() + t, 1.0) - p * point_;
-  const Eigen::Vector3d d = Eigen::Vector3d::UnitX() - q * point_;
-  const double A = d.squaredNorm() - squared_radius_ * q * q;
-  const double B = g.dot(d) - squared_radius_ * p * q;
-  const double C = g.squaredNorm() - squared_radius_ * p * p;
-  if (!(A > 0.0))
+  if (!(A_ > 0.0))
     return {-kEndless, kEndless};
-  const double discriminant = B * B - A * C;
+  const double B = B_[0] + B_[1] * t;
+  const double C = C_[0] + t * (C_[1] + t * C_[2]);
+  const double discriminant = B * B - A_ * C;
   if (discriminant < 0.0)
     return {kEndless, -kEndless};
   const double root = std::sqrt(discriminant);
-  return {(-B - root) / A, (-B + root) / A};
+  return {(-B - root) / A_, (-B + root) / A_};
 }
 
 } // namespace holdfast

@@ -56,6 +56,11 @@ public:
     return h_;
   }
 
+  bool isPlane() const
+  {
+    return h_[3] == 0.0 && h_[4] == 0.0 && h_[5] == 0.0;
+  }
+
   const Eigen::Vector2d& seedRay() const
   {
     return ray_;
@@ -103,7 +108,8 @@ public:
   }
 
   /// Slopes s between which rays of this t meet the tangent plane within the radius;
-  /// first > second when none does. Endless where the plane is seen edge-on.
+  /// first > second when none does. Endless where the plane is seen edge-on. Where the
+  /// surface is a plane, no others are within the radius.
   std::pair<double, double> chord(double t) const;
 
 private:
@@ -111,6 +117,11 @@ private:
   Eigen::Vector2d ray_;
   Eigen::Vector3d point_, normal_;
   double squared_radius_;
+  /// Of the squared distance along the tangent plane, less the squared radius, times
+  /// 1/z^2, as A s^2 + 2 (B . (1, t)) s + C . (1, t, t^2).
+  double A_;
+  std::array<double, 2> B_;
+  std::array<double, 3> C_;
 };
 
 } // namespace holdfast

@@ -70,6 +70,24 @@ public:
 
   // For n pixels from slope `s` on. Without branches and with local copies, so that
   // several pixels are looked at at once.
+  void runOnPlane(const float* __restrict depth,
+                  float s,
+                  float pitch,
+                  float gate,
+                  int n,
+                  float* __restrict out) const
+  {
+    constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+    const float first = rho_[0] + rho_[1] * s, step = rho_[1] * pitch;
+    for (int i = 0; i < n; ++i) {
+      const float rho = first + step * static_cast<float>(i);
+      const float departure = 1.0F / depth[i] - rho;
+      const bool belongs = (std::abs(departure) <= gate) & (rho > 0.0F);
+      out[i] = belongs ? departure : kNone;
+    }
+  }
+
+  // The same where the surface bends, and not all that the chord holds is within.
   void run(const float* __restrict depth,
            float s,
            float pitch,
@@ -144,7 +162,7 @@ public:
     // Beyond the disc on the tangent plane, for the disc on the curved surface.
     constexpr double kMargin = 1.2;
     const LateralDisc within(surface_, radius_m);
-    const LateralDisc about(surface_, kMargin * radius_m);
+    const LateralDisc about(surface_, (surface_.isPlane() ? 1.0 : kMargin) * radius_m);
     const PixelWindow window = grid_.ballWindow(surface_.point(), kMargin * radius_m);
     const int columns = window.columns.end - window.columns.begin;
     const int rows = window.rows.end - window.rows.begin;
@@ -200,14 +218,16 @@ private:
   PixelRange chord(const LateralDisc& disc, int v, const PixelRange& columns) const
   {
     const auto [low, high] = disc.chord((v - v0_) / grid_.camera.fy);
-    const auto pixel = [&](double s) {
-      return static_cast<int>(std::clamp(s * grid_.camera.fx + u0_,
-                                         static_cast<double>(columns.begin),
-                                         static_cast<double>(columns.end)));
-    };
     if (!(low <= high))
       return {columns.begin, columns.begin};
-    return {pixel(std::floor(low)), std::min(pixel(high) + 1, columns.end)};
+    const double first = low * grid_.camera.fx + u0_;
+    const double last = high * grid_.camera.fx + u0_;
+    const int begin = static_cast<int>(
+        std::ceil(std::clamp(first, double(columns.begin), double(columns.end))));
+    const int end = static_cast<int>(std::floor(
+                        std::clamp(last, columns.begin - 1.0, columns.end - 1.0))) +
+                    1;
+    return {begin, std::max(begin, end)};
   }
 
   // By how much 1/z of the points leaves the surface; NaN where they are no part of it.
@@ -220,12 +240,13 @@ private:
     const float t = static_cast<float>((v - v0_) / grid_.camera.fy);
     const float pitch = static_cast<float>(1.0 / grid_.camera.fx);
     const RowTest test(surface_, within, t);
-    test.run(grid_.row(v) + range.begin,
-             pitch * static_cast<float>(range.begin - u0_),
-             pitch,
-             gate,
-             range.end - range.begin,
-             out + range.begin);
+    const auto run = surface_.isPlane() ? &RowTest::runOnPlane : &RowTest::run;
+    (test.*run)(grid_.row(v) + range.begin,
+                pitch * static_cast<float>(range.begin - u0_),
+                pitch,
+                gate,
+                range.end - range.begin,
+                out + range.begin);
   }
 
   const PixelGrid& grid_;

@@ -1,6 +1,6 @@
 #include "local_points.h"
 
-#include <holdfast/patch/surface.h>
+#include "patch_form.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,19 +8,6 @@
 
 namespace holdfast {
 namespace {
-
-using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-
-kernel::PatchForm
-formOf(const Patch& patch, const Eigen::Vector3d& origin)
-{
-  kernel::PatchForm form{{}, {}, {}, BoundaryForm(patch)};
-  Eigen::Map<RowMajor>(form.R) = patch.pose().R;
-  // The origins are subtracted first, so that patches far from zero lose no precision.
-  Eigen::Map<Eigen::Vector3d>(form.c) = patch.c - origin;
-  Eigen::Map<Eigen::Vector3d>(form.k) = implicitDiagonal(patch);
-  return form;
-}
 
 kernel::Points
 viewOf(const PointBatch& points)
@@ -67,7 +54,11 @@ LocalPoints::place(const Patch& patch, const PointBatch& points)
              row + 4 * rows,
              row + 5 * rows};
   size_ = points.size();
-  kernel::kernel().placePoints(viewOf(points), formOf(patch, points.origin()), placed_);
+  // The origins are subtracted first, so that patches far from zero lose no precision.
+  kernel::kernel().placePoints(
+      viewOf(points),
+      patchForm(patch, patch.pose().R, patch.c - points.origin()),
+      placed_);
   leaveOutInvalid();
 }
 
