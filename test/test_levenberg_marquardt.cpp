@@ -20,6 +20,7 @@ struct Evaluation {
 template <typename Residuals>
 struct Problem {
   using State = Vector2;
+  static constexpr int kSize = 2;
   using Evaluation = holdfast::Evaluation;
 
   Residuals residuals; // (x, e, J)

@@ -1,7 +1,8 @@
 /// \file Damped Gauss-Newton (Levenberg-Marquardt) over a small problem.
 #pragma once
 
-#include <Eigen/Cholesky>
+#include "geometry/small_cholesky.h"
+
 #include <Eigen/Core>
 
 #include <algorithm>
@@ -61,11 +62,11 @@ private:
 
 /// Minimises a cost that the problem evaluates.
 ///
-/// Problem has: `State`; `Evaluation` with members `cost`, `gradient` (n) and `JtJ`
-/// (n x n); `void evaluate(const State&, Evaluation&) const`; and
-/// `State retract(const State&, const Step&) const`.
-/// \param state start; on return the solution, or the best state seen.
-/// \param evaluation on return the evaluation there, or, when converged, within
+/// Problem has: `State`; `kSize`, the n below; `Evaluation` with members `cost`,
+/// `gradient` (n) and `JtJ` (n x n); `void evaluate(const State&, Evaluation&) const`;
+/// and `State retract(const State&, const Step&) const`. \param state start; on return
+/// the solution, or the best state seen. \param evaluation on return the evaluation
+/// there, or, when converged, within
 ///        step_tolerance_sigma of it.
 template <typename Problem>
 LevenbergMarquardtSummary
@@ -86,8 +87,8 @@ levenbergMarquardt(const Problem& problem,
   while (true) {
     auto damped = evaluation.JtJ;
     damped.diagonal() *= 1.0 + damping.value();
-    const auto cholesky = damped.llt();
-    if (cholesky.info() != Eigen::Success) {
+    const SmallCholesky<Problem::kSize> cholesky(damped);
+    if (!cholesky.isPositive()) {
       summary.stop = Stop::Singular;
       if (damping.exhausted())
         return summary;

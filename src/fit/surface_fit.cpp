@@ -3,9 +3,9 @@
 #include <holdfast/geometry/rotation.h>
 
 #include "fit/models/models.h"
+#include "geometry/small_cholesky.h"
 #include "geometry/symmetric.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 
@@ -66,6 +66,7 @@ gradientOf(Model model, const double gradient[])
 // The weighted least-squares problem of one surface, as levenbergMarquardt() wants it.
 struct SurfaceProblem {
   using State = UnboundedSurface;
+  static constexpr int kSize = kernel::kMaxTheta;
   struct Evaluation {
     double cost = 0.0;
     Theta gradient = Theta::Zero();
@@ -125,32 +126,33 @@ unitScale(const ThetaMatrix& H, Model model)
 // Cholesky factors of normal equations scaled to unit diagonal.
 class ScaledCholesky {
 public:
-  ScaledCholesky(const ThetaMatrix& H, Model model) : scale_(unitScale(H, model))
-  {
-    const bool positive = H.diagonal().minCoeff() > 0.0 && H.diagonal().allFinite();
-    if (!positive)
-      return;
-    cholesky_.compute(scale_.asDiagonal() * H * scale_.asDiagonal());
-    if (cholesky_.info() == Eigen::Success)
-      smallest_pivot_ = cholesky_.matrixLLT().diagonal().cwiseAbs2().minCoeff();
-  }
+  ScaledCholesky(const ThetaMatrix& H, Model model)
+  : scale_(unitScale(H, model)), cholesky_(scaled(H))
+  {}
 
   // 0 when the matrix is not positive definite: then there is nothing to solve.
   double smallestPivot() const
   {
-    return smallest_pivot_;
+    return cholesky_.smallestPivot();
   }
 
   Theta solve(const Theta& b) const
   {
-    const Theta scaled = scale_.cwiseProduct(b);
-    return scale_.cwiseProduct(Theta(cholesky_.solve(scaled)));
+    return scale_.cwiseProduct(cholesky_.solve(scale_.cwiseProduct(b)));
   }
 
 private:
+  ThetaMatrix scaled(const ThetaMatrix& H) const
+  {
+    ThetaMatrix S;
+    for (int j = 0; j < kernel::kMaxTheta; ++j)
+      for (int i = 0; i < kernel::kMaxTheta; ++i)
+        S(i, j) = scale_[i] * H(i, j) * scale_[j];
+    return S;
+  }
+
   Theta scale_;
-  Eigen::LLT<ThetaMatrix> cholesky_;
-  double smallest_pivot_ = 0.0;
+  SmallCholesky<kernel::kMaxTheta> cholesky_;
 };
 
 // Undetermined directions: eigenvectors of the scaled normal equations, of which there
@@ -645,20 +647,7 @@ fitSurface(kernel::Model model,
 ThetaMatrix
 symmetricInverse(const ThetaMatrix& H)
 {
-  // Eigen solves for all columns of so small a matrix at several times this cost.
-  const Eigen::LLT<ThetaMatrix> cholesky(H);
-  const ThetaMatrix& L = cholesky.matrixLLT();
-  ThetaMatrix inverse = ThetaMatrix::Zero(); // of L
-  for (int j = 0; j < kernel::kMaxTheta; ++j) {
-    inverse(j, j) = 1.0 / L(j, j);
-    for (int i = j + 1; i < kernel::kMaxTheta; ++i) {
-      double sum = 0.0;
-      for (int k = j; k < i; ++k)
-        sum += L(i, k) * inverse(k, j);
-      inverse(i, j) = -sum / L(i, i);
-    }
-  }
-  return inverse.transpose().lazyProduct(inverse);
+  return SmallCholesky<kernel::kMaxTheta>(H).inverse();
 }
 
 ThetaMatrix

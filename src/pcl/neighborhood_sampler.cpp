@@ -41,7 +41,7 @@ struct NeighborhoodSampler::Scratch {
   SurfacePatchScratch patch;
   std::vector<bool> belongs;
   std::vector<Eigen::Vector3d> candidates;
-  std::vector<Run> runs;
+  RunMemory runs;
   std::vector<PathEnd> heap;
   std::vector<float> path_length;
   std::vector<int> ball;

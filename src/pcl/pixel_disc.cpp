@@ -20,7 +20,7 @@ connectedDisc(const PixelGrid& grid,
               int seed,
               double radius_m,
               const JumpLimit& limit,
-              std::vector<Run>& runs,
+              RunMemory& runs,
               std::vector<int>& indices)
 {
   const Camera& camera = grid.camera;

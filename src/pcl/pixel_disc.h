@@ -27,7 +27,7 @@ void connectedDisc(const PixelGrid& grid,
                    int seed,
                    double radius_m,
                    const JumpLimit& limit,
-                   std::vector<Run>& runs,
+                   RunMemory& runs,
                    std::vector<int>& indices);
 
 } // namespace holdfast

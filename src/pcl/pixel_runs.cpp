@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace holdfast {
 
@@ -48,14 +49,25 @@ PixelRuns::addRow(int row, PixelRange columns)
 {
   const float* value = values_.row(row);
   const int here = static_cast<int>(runs_.size());
-  int u = columns.begin;
-  while (u < columns.end) {
-    const int begin = u++;
-    // Comparisons with NaN are false: an invalid pixel ends a run.
-    while (u < columns.end && std::abs(value[u] - value[u - 1]) < jump_.in_row)
-      ++u;
-    if (!std::isnan(value[begin]))
-      runs_.push_back({row, begin, u, static_cast<int>(runs_.size())});
+  const int width = std::max(columns.end - columns.begin, 0);
+  // Whether a pixel goes on where the one before is: without branches first, several
+  // pixels at a time. Comparisons with NaN are false: an invalid pixel ends a run.
+  continues_.resize(static_cast<std::size_t>(width) + 1);
+  char* const continues = continues_.data();
+  const float* const first = value + columns.begin;
+  for (int i = 1; i < width; ++i)
+    continues[i] = std::abs(first[i] - first[i - 1]) < jump_.in_row;
+  continues[width] = false;
+  for (int begin = 0; begin < width;) {
+    const void* const stop =
+        std::memchr(continues + begin + 1, 0, static_cast<std::size_t>(width - begin));
+    const int end = static_cast<int>(static_cast<const char*>(stop) - continues);
+    if (!std::isnan(first[begin]))
+      runs_.push_back({row,
+                       columns.begin + begin,
+                       columns.begin + end,
+                       static_cast<int>(runs_.size())});
+    begin = end;
   }
   joinRows(above_, here);
   above_ = here;

@@ -29,6 +29,12 @@ struct Run {
   int parent;
 };
 
+/// Kept between searches: no allocation once it has seen the largest.
+struct RunMemory {
+  std::vector<Run> runs;
+  std::vector<char> continues; ///< of a row
+};
+
 /// Largest difference of values between neighbours that belong together.
 struct PixelJump {
   float in_row;
@@ -38,9 +44,8 @@ struct PixelJump {
 /// Collects the runs of rows from the first to the last, then the component of a seed.
 class PixelRuns {
 public:
-  /// \param runs working memory.
-  PixelRuns(const PixelRows& values, const PixelJump& jump, std::vector<Run>& runs)
-  : values_(values), jump_(jump), runs_(runs)
+  PixelRuns(const PixelRows& values, const PixelJump& jump, RunMemory& memory)
+  : values_(values), jump_(jump), runs_(memory.runs), continues_(memory.continues)
   {
     runs_.clear();
   }
@@ -60,6 +65,7 @@ private:
   PixelRows values_;
   PixelJump jump_;
   std::vector<Run>& runs_;
+  std::vector<char>& continues_; ///< whether pixels go on where those before them are
   int above_ = 0; ///< where the runs of the last row begin
 };
 

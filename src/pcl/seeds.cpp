@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <random>
 #include <unordered_map>
@@ -175,6 +176,8 @@ public:
   , columns_((grid.camera.width + cell_px - 1) / cell_px)
   , rows_((grid.camera.height + cell_px - 1) / cell_px)
   , first_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_), kNone)
+  , words_(columns_ / kBits + 1)
+  , has_seeds_(static_cast<std::size_t>(words_) * static_cast<std::size_t>(rows_))
   {}
 
   /// Adds the pixel unless a seed is nearer than the spacing. \return the distance to
@@ -190,12 +193,14 @@ public:
     const PixelRange columns = cells(window.columns, columns_);
     const PixelRange rows = cells(window.rows, rows_);
     for (int row = rows.begin; row < rows.end; ++row)
-      for (int column = columns.begin; column < columns.end; ++column)
+      for (int column = nextSeeds(columns.begin, row); column < columns.end;
+           column = nextSeeds(column + 1, row))
         for (int i = first_[cellAt(column, row)]; i != kNone; i = seeds_[i].next) {
           const double squared = (seeds_[i].point - p).squaredNorm();
           if (squared < spacing_ * spacing_)
             return std::sqrt(squared);
         }
+    setSeeds(u / cell_px_, v / cell_px_);
     int& first = first_[cellAt(u / cell_px_, v / cell_px_)];
     seeds_.push_back({p, v * grid_.camera.width + u, first});
     first = static_cast<int>(seeds_.size()) - 1;
@@ -233,10 +238,38 @@ private:
            static_cast<std::size_t>(column);
   }
 
+  std::uint64_t& wordAt(int column, int row)
+  {
+    return has_seeds_[static_cast<std::size_t>(row * words_ + column / kBits)];
+  }
+
+  void setSeeds(int column, int row)
+  {
+    wordAt(column, row) |= std::uint64_t{1} << (column % kBits);
+  }
+
+  /// The next cell with seeds from a column on; beyond the last when there is none.
+  int nextSeeds(int column, int row)
+  {
+    for (; column < columns_; column = (column / kBits + 1) * kBits) {
+      std::uint64_t left = wordAt(column, row) >> (column % kBits);
+      if (left == 0)
+        continue;
+      for (; (left & 1) == 0; left >>= 1)
+        ++column;
+      return column;
+    }
+    return columns_;
+  }
+
+  static constexpr int kBits = 64;
+
   const PixelGrid& grid_;
   double spacing_;
   int cell_px_, columns_, rows_;
   std::vector<int> first_;
+  int words_; ///< of has_seeds_, for a row of cells
+  std::vector<std::uint64_t> has_seeds_; ///< a bit for each cell: most are empty
   std::vector<Seed> seeds_;
 };
 

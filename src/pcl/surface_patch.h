@@ -24,7 +24,7 @@ struct SurfacePatchSettings {
 
 /// Working memory.
 struct SurfacePatchScratch {
-  std::vector<Run> runs;
+  RunMemory runs;
   std::vector<int> pixels;
   std::vector<int> members;
   std::vector<float> window;

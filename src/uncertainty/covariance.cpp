@@ -1,6 +1,7 @@
 #include "covariance.h"
 
 #include "fit/models/models.h"
+#include "geometry/congruence.h"
 
 #include "second_order.h"
 #include "stagewise.h"
@@ -221,19 +222,24 @@ planeStageCovariance(const PatchFit& fit,
   return symmetrized(ParameterMatrix(Gp * sums.own * Gp.transpose() + 2.0 * cross));
 }
 
-// What errors that points share add to the covariance.
-ParameterMatrix
-patternTerms(const PatternMatrix& pattern, const ByTheta& G, const ByMoments& M)
+// Covariance of what moves the estimate: X_i dq_i, then the moments (JointLayout).
+SmallRows
+noiseOf(const Linearization& l)
 {
-  Eigen::Matrix<double,
-                Eigen::Dynamic,
-                kPatternTerms,
-                Eigen::RowMajor,
-                kMaxParameters,
-                kPatternTerms>
-      J(G.rows(), kPatternTerms);
-  J << G, M;
-  return J.lazyProduct(pattern).eval().lazyProduct(J.transpose());
+  constexpr int kTheta = kernel::kMaxTheta;
+  SmallRows C;
+  for (int i = 0; i < kPatternTerms; ++i)
+    for (int j = 0; j < kPatternTerms; ++j) {
+      const bool theta_i = i < kTheta, theta_j = j < kTheta;
+      C(i, j) = theta_i && theta_j ? l.XX(i, j) :
+                theta_i            ? l.XD(i, j - kTheta) :
+                theta_j            ? l.XD(j, i - kTheta) :
+                                     l.DD(i - kTheta, j - kTheta);
+      // What errors that points share add.
+      if (l.has_pattern)
+        C(i, j) += l.pattern(i, j);
+    }
+  return C;
 }
 
 // Of what has the Jacobian F to the joint variables.
@@ -252,13 +258,15 @@ firstOrderCovariance(const PatchJacobian& F,
   // blocked product costs several times the work.
   const ByTheta G = gain(F.middleCols<6>(JointLayout::kTheta), inverse);
   const ByMoments M = F.middleCols<9>(JointLayout::kMean) + G.lazyProduct(l.A);
-  const ByTheta with_theta =
-      G.lazyProduct(l.XX) + 2.0 * M.lazyProduct(l.XD.transpose());
-  const ByMoments with_moments = M.lazyProduct(l.DD);
-  ParameterMatrix covariance =
-      with_theta.lazyProduct(G.transpose()) + with_moments.lazyProduct(M.transpose());
-  if (l.has_pattern)
-    covariance += patternTerms(l.pattern, G, M);
+  SmallRows J;
+  const int n = static_cast<int>(G.rows());
+  for (int i = 0; i < n; ++i) {
+    for (int k = 0; k < 6; ++k)
+      J(i, k) = G(i, k);
+    for (int k = 0; k < 9; ++k)
+      J(i, 6 + k) = M(i, k);
+  }
+  auto covariance = J.congruence<ParameterMatrix>(n, kPatternTerms, noiseOf(l));
   if (fit.has_plane_stage)
     covariance +=
         planeStageCovariance(fit,
@@ -270,13 +278,13 @@ firstOrderCovariance(const PatchJacobian& F,
   return symmetrized(covariance);
 }
 
-// J S J^T; gaussian.h has it for matrices of any size, with Eigen's blocked product.
 template <typename Jacobian>
 ParameterMatrix
 propagated(const Jacobian& J, const ParameterMatrix& S)
 {
-  return symmetrized(
-      ParameterMatrix(J.lazyProduct(S).eval().lazyProduct(J.transpose())));
+  return SmallRows(J).congruence<ParameterMatrix>(static_cast<int>(J.rows()),
+                                                  static_cast<int>(J.cols()),
+                                                  SmallRows(S));
 }
 
 // Covariance of the joint variables (JointLayout).
