@@ -194,10 +194,11 @@ TEST_F(ExperimentProgram, NeighborhoodsOfRocksAndEdges)
     ++rows;
     EXPECT_LE(row.at("failures").get<int>(), 10);
     EXPECT_GT(row.at("extent").get<double>(), 0.3);
-    const double over_edge = row.at("over_edge");
+    const double over_edge = row.at("over_edge"), elsewhere = row.at("elsewhere");
     if (row.at("scene") == "step" && row.at("neighborhood") == "patch" &&
         row.at("radius_m") >= 0.05) {
       EXPECT_NEAR(row.at("chi2_ratio").get<double>(), 1.0, 0.3);
+      EXPECT_LT(elsewhere, 0.02);
     }
     if (row.at("scene") == "ridge" && row.at("neighborhood") == "disc") {
       EXPECT_GT(over_edge, 0.3);
