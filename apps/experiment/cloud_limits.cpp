@@ -59,8 +59,22 @@ optionsOf(const std::vector<LimitSet>& sets)
 Json
 limitRow(const LimitSet& set, const CloudCheck& check)
 {
+  const Json all = summaryOf(check);
   Json row = {{"limit", set.limit}, {"value", set.value}};
-  row.update(summaryOf(check));
+  for (const char* key : {"radius_m",
+                          "type",
+                          "trials",
+                          "seeds",
+                          "patches",
+                          "far",
+                          "other_type",
+                          "state_nees_per_dof",
+                          "state_coverage95",
+                          "surface_nees_per_dof",
+                          "surface_coverage95",
+                          "over_edge",
+                          "covered"})
+    row[key] = all[key];
   row["accepted_rate"] = check.seeds > 0 ?
                              Json(static_cast<double>(check.accepted) / check.seeds) :
                              Json();

@@ -13,6 +13,7 @@
 #include "evaluation/fit_error.h"
 #include "pcl/point_gatherer.h"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <stdexcept>
@@ -176,8 +177,9 @@ struct Outcome {
   int points = 0;
   double chi2 = 0.0;
   double chi2_expected = 0.0;
-  double nees = 0.0;
+  std::optional<double> nees; ///< nothing where the true points have another type
   double extent = 0.0; ///< of the true points, over the radius asked for
+  double elsewhere = 0.0; ///< share of the points that are on another surface
 };
 
 /// One kind on one noisy image.
@@ -215,9 +217,17 @@ public:
       return outcome;
     outcome.over_edge = leavesTrueSurface(image_, camera_, fit.patch);
     outcome.points = fit.points;
+    const int surface = image_.hits[static_cast<std::size_t>(middle)];
+    const auto elsewhere =
+        std::count_if(indices_.begin(), indices_.end(), [&](int pixel) {
+          return image_.hits[static_cast<std::size_t>(pixel)] != surface;
+        });
+    outcome.elsewhere =
+        static_cast<double>(elsewhere) / static_cast<double>(indices_.size());
     outcome.chi2 = fit.chi2;
     outcome.chi2_expected = fit.chi2_expected;
-    outcome.nees = stateError(fit, reference.state).nees_per_dof;
+    if (fit.patch.type == reference.patch.type)
+      outcome.nees = stateError(fit, reference.state).nees_per_dof;
     outcome.extent =
         validate(reference, batch_, ValidationOptions::withoutLimits()).extent_m /
         radius_m_;
@@ -294,18 +304,21 @@ rowOf(std::size_t kind,
   // As whole clouds count them: some settle at another minimum, hundreds of sigmas
   // away, where the surface misfits, and one of them would be the mean.
   constexpr double kFar = 100.0; // NEES/dof
-  Mean points, extent, ratio, nees, over_edge;
-  int far = 0;
+  Mean points, extent, ratio, nees, elsewhere, over_edge;
+  int far = 0, other_type = 0;
   for (const TrialOutcomes& trial : trials) {
     const Outcome& outcome = trial[kind];
     if (!outcome.usable)
       continue;
     points.add(outcome.points);
     extent.add(outcome.extent);
+    elsewhere.add(outcome.elsewhere);
     over_edge.add(outcome.over_edge ? 1.0 : 0.0);
     ratio.add(outcome.chi2 / outcome.chi2_expected);
-    if (outcome.nees <= kFar)
-      nees.add(outcome.nees);
+    if (!outcome.nees)
+      ++other_type;
+    else if (*outcome.nees <= kFar)
+      nees.add(*outcome.nees);
     else
       ++far;
   }
@@ -323,6 +336,8 @@ rowOf(std::size_t kind,
       {"nees_per_dof", nees.value()},
       {"nees_standard_error", nees.standardError()},
       {"far", far},
+      {"other_type", other_type},
+      {"elsewhere", elsewhere.value()},
       {"over_edge", over_edge.value()},
       {"failures", static_cast<int>(trials.size()) - points.count}};
 }
@@ -421,6 +436,8 @@ run(const ExperimentSettings& settings)
                     {"NEES/dof", "nees_per_dof"},
                     {"std. error", "nees_standard_error"},
                     {"far", "far"},
+                    {"other type", "other_type"},
+                    {"elsewhere", "elsewhere"},
                     {"over an edge", "over_edge"},
                     {"failures", "failures"}};
   report.remarks = {
@@ -432,15 +449,18 @@ run(const ExperimentSettings& settings)
       "its end, another one 10 cm behind; ridge: the same where two planes meet at "
       "right "
       "angles. NEES is about the fit to the true points of the same pixels, without "
-      "those more than ten sigmas off (far); the extent is that of a full disc of the "
-      "radius asked for; over an edge: share of the patches that leave the true "
+      "those more than ten sigmas off (far) and those of another type; the extent is "
+      "that of a full disc of the "
+      "radius asked for; elsewhere: share of the points that are on another surface "
+      "than "
+      "the pixel; over an edge: of the patches that leave the true "
       "surface "
       "by more than four sigmas of a point in a twentieth of their area.",
       "A ball cuts off the points that noise has moved out of it along the ray, so "
-      "small "
-      "ones show too little of it, and since which points it holds depends on the "
-      "noise, "
-      "its NEES is off at any radius. A disc of pixels does not choose by depth, but "
+      "small ones show too little of it, and since which points it holds depends on "
+      "the "
+      "noise, its NEES is off at any radius. A disc of pixels does not choose by "
+      "depth, but "
       "stretches by 1/cos of the tilt; a patch does neither."};
   report.plot.columns = 3;
   report.plot.panels = {

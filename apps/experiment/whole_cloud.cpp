@@ -236,7 +236,7 @@ private:
   {
     const PointSelection chosen = selectPoints(cloud, sensor);
     const NeighborhoodSampler sampler(chosen.cloud, chosen.sensor, options.sampler);
-    const auto scratch = sampler.makeScratch();
+    const auto scratch = sampler.makeScratch(); // of one thread, as frames have
     std::vector<Attempts*> waiting;
     PatchSites sites;
     sites.seeds.emplace();

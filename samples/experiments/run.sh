@@ -28,9 +28,11 @@ run modes consistency --trials 5000 --seed 7 --scene table2 robot-1.0 \
 run departures consistency --trials 5000 --seed 7 --scene robot-1.0 \
   --options without-ray without-debias without-surface-noise without-pca-normal \
   without-smooth-circle
-# Views nobody chose; every patch of whole clouds; and errors that neighbouring pixels share.
+# Views nobody chose; every patch of whole clouds, and by the limits of acceptance; and
+# errors that neighbouring pixels share.
 run sweep consistency --trials 3000 --seed 7 --scene sweep
 run clouds consistency --trials 300 --seed 7 --scene rocks table stairs mix
+run limits consistency --trials 300 --seed 7 --scene rocks table stairs mix --limits
 run pattern consistency --trials 1000 --seed 7 --scene sweep-1.0 --sensor xtion
 # The paper's table and figures, and two questions it leaves open.
 run . table1 --trials 10000 --seed 7
