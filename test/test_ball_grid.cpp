@@ -96,6 +96,7 @@ TEST(BallGrid, CloudsFarOutAndRadiiBeyondAllSizes)
   const auto cloud = blob(random, 500, {3e4, -2e5, 100.0}, 0.5);
   expectSameAsTree(cloud, everyOther(*cloud), 1e-9, {0.2, 10.0});
   expectSameAsTree(cloud, everyOther(*cloud), 1e6, {0.2, 10.0});
+  expectSameAsTree(cloud, everyOther(*cloud), 1e-320, {0.2, 10.0});
 }
 
 TEST(BallGrid, NothingIsFoundInNothing)

@@ -256,6 +256,35 @@ TEST(PatchIo, TextIsTheSameForAnyNumberOfThreads)
               pack(patches[i].fit.state).tail<1>()[0]);
 }
 
+// A text that some other program has put in order: blanks, brackets in strings, members
+// in another order.
+TEST(PatchIo, ForeignLayoutsAreRead)
+{
+  const PatchReport report = someReport();
+  nlohmann::json json = nlohmann::json::parse(jsonText(report, JsonLayout::OneLine));
+  json["cloud"] = "a \"patches\":[{ ]} \\";
+  json["aaa"] = {{"patches", {1, 2, "]"}}};
+  for (const int indent : {-1, 0, 2}) {
+    const PatchReport read = readJson(json.dump(indent));
+    EXPECT_EQ(read.cloud, json["cloud"]);
+    ASSERT_EQ(read.result.patches.size(), report.result.patches.size());
+    EXPECT_EQ(pack(read.result.patches.back().fit.patch),
+              pack(report.result.patches.back().fit.patch));
+  }
+}
+
+TEST(PatchIo, BrokenJsonIsAnErrorWhereverItBreaks)
+{
+  const std::string text = jsonText(someReport(), JsonLayout::PatchPerLine);
+  for (std::size_t n = 0; n + 3 < text.size(); n += 1 + text.size() / 500)
+    EXPECT_THROW(readJson(text.substr(0, n)), std::runtime_error) << n;
+  const std::size_t first = text.find("\"patches\":[");
+  for (const std::string wrong : {",", "[", "]", "}", "1 2", "nul", "\""})
+    EXPECT_THROW(readJson(std::string(text).insert(first + 11, wrong)),
+                 std::runtime_error)
+        << wrong;
+}
+
 TEST(PatchIo, NumbersKeepTheirKindAndSymmetryItsDigits)
 {
   PatchReport report = someReport();

@@ -1,3 +1,4 @@
+#include "json_split.h"
 #include "json_text.h"
 #include "pcd_writer.h"
 
@@ -604,6 +605,36 @@ patchFromJson(const Json& json, double containment)
   return extracted;
 }
 
+/// In the frame of the points, which lies at the offset.
+ExtractedPatch
+readPatch(const Json& json, double containment, const Eigen::Vector3d& offset)
+{
+  ExtractedPatch read = patchFromJson(json, containment);
+  read.fit.patch.c -= offset;
+  read.fit.state.centre -= offset;
+  if (read.seed_index)
+    read.seed -= offset;
+  return read;
+}
+
+/// Each from its own text: the tree of all of them would take gigabytes.
+std::vector<ExtractedPatch>
+readPatches(const std::vector<std::string_view>& texts,
+            double containment,
+            const Eigen::Vector3d& offset)
+{
+  constexpr std::size_t kPatches = 64; // of one piece of work
+  std::vector<ExtractedPatch> patches(texts.size());
+  const auto work = [&](int item, int) {
+    const std::size_t begin = static_cast<std::size_t>(item) * kPatches;
+    for (std::size_t i = begin; i < std::min(begin + kPatches, texts.size()); ++i)
+      patches[i] = readPatch(Json::parse(texts[i]), containment, offset);
+  };
+  const std::size_t items = (texts.size() + kPatches - 1) / kPatches;
+  parallelFor(static_cast<int>(items), items < 2 ? 1 : 0, work);
+  return patches;
+}
+
 void
 requireKnownSchema(const Json& json)
 {
@@ -737,7 +768,8 @@ PatchReport
 readJson(const std::string& text)
 {
   try {
-    const Json json = Json::parse(text);
+    const auto split = io::splitJsonArray(text, "patches");
+    const Json json = Json::parse(split ? split->rest : text);
     requireKnownSchema(json);
     PatchReport report;
     report.cloud = json.at("cloud");
@@ -750,14 +782,11 @@ readJson(const std::string& text)
     if (const auto offset = json.find("offset"); offset != json.end())
       for (std::size_t i = 0; i < 3; ++i)
         report.offset(static_cast<Eigen::Index>(i)) = offset->at(i);
-    for (const Json& patch : json.at("patches")) {
-      report.result.patches.push_back(patchFromJson(patch, containment));
-      ExtractedPatch& read = report.result.patches.back();
-      read.fit.patch.c -= report.offset;
-      read.fit.state.centre -= report.offset;
-      if (read.seed_index)
-        read.seed -= report.offset;
-    }
+    if (split)
+      report.result.patches = readPatches(split->elements, containment, report.offset);
+    else
+      for (const Json& patch : json.at("patches"))
+        report.result.patches.push_back(readPatch(patch, containment, report.offset));
     readRejected(json.at("rejected"), report.result);
     return report;
   }

@@ -27,7 +27,7 @@ struct Range {
 BallGrid::BallGrid(const pcl::PointCloud<pcl::PointXYZ>& points,
                    const std::vector<int>& valid,
                    double edge_m)
-: edge_m_(edge_m)
+: cubes_per_m_(std::min(1.0 / edge_m, 1e100)) // so that 0 stays 0
 {
   sortIntoRows(points, valid);
   cutRows();
@@ -38,8 +38,9 @@ std::int32_t
 BallGrid::cubeOf(double coordinate) const
 {
   constexpr double kFarthest = 1e9;
-  return static_cast<std::int32_t>(
-      std::clamp(std::floor(coordinate / edge_m_), -kFarthest, kFarthest));
+  const double place = std::clamp(coordinate * cubes_per_m_, -kFarthest, kFarthest);
+  const auto towards_zero = static_cast<std::int32_t>(place);
+  return towards_zero - (place < towards_zero ? 1 : 0); // floor() is a call
 }
 
 std::uint64_t

@@ -57,7 +57,7 @@ private:
                  double radius,
                  std::vector<int>& indices) const;
 
-  double edge_m_;
+  double cubes_per_m_;
   std::vector<Entry> entries_;
   std::vector<Cube> cubes_; ///< and one behind the last
   std::unordered_map<std::uint64_t, Row> rows_;
