@@ -20,15 +20,13 @@ coarsestFor(CovarianceMode mode)
                                              kernel::Precision::Single;
 }
 
-// Where d, k and r are at the end of what they can tell, so do those of their
-// covariance.
+// Terms of the covariance of a centre out of reach all but cancel.
 bool
 isWorthAllDigits(const PatchFit& fit, const FitResult& result)
 {
   return fit.surface.precision == kernel::Precision::Single &&
          fit.status == FitStatus::Converged &&
-         (!isUsable(result.status) || result.flags.curvature_not_observable ||
-          result.flags.orientation_singular);
+         (!isUsable(result.status) || result.flags.curvature_not_observable);
 }
 
 void

@@ -179,6 +179,9 @@ struct CellSums {
   double covariance[kCells][kCells];
 };
 
+/// Rows of as many numbers each, of small matrices whose size is known at run time.
+inline constexpr int kSmallRow = 16;
+
 /// The functions of the hot path, compiled for one instruction set.
 struct Kernel {
   const char* instruction_set; ///< "AVX3", "AVX2", "SSE2", ..., "scalar" (reference)
@@ -247,6 +250,10 @@ struct Kernel {
   /// their distance in rows and columns alone.
   /// \param out kCellRow rows of as many.
   void (*sumOverCells)(const CellSums& cells, double* out);
+
+  /// J S J^T of n rows of J and a symmetric S of m, all in rows of kSmallRow, aligned,
+  /// zero behind their entries.
+  void (*congruence)(const double* J, int n, const double* S, int m, double* out);
 };
 
 /// The fastest one for this processor, chosen at the first call (from any thread).

@@ -682,3 +682,37 @@ sumOverCells(const CellSums& cells, double* out)
     for (int i = 0; i < kRowNumbers; ++i)
       store(sum[row][i], out + row * kCellRow + i * kLanes);
 }
+
+// ---- Small matrices ---------------------------------------------------------------
+
+constexpr int kSmallNumbers = kSmallRow / kLanes;
+
+// Row a of n numbers times n rows of B.
+HOLDFAST_INLINE void
+multiplyRow(const double* a, int n, const double* B, double* out)
+{
+  Number sum[kSmallNumbers];
+  for (Number& entry : sum)
+    entry = Number(0.0);
+  for (int k = 0; k < n; ++k) {
+    const Number factor(a[k]);
+    for (int i = 0; i < kSmallNumbers; ++i)
+      sum[i] = sum[i] + factor * load(B + k * kSmallRow + i * kLanes);
+  }
+  for (int i = 0; i < kSmallNumbers; ++i)
+    store(sum[i], out + i * kLanes);
+}
+
+inline void
+congruence(const double* J, int n, const double* S, int m, double* out)
+{
+  alignas(64) double transposed[kSmallRow][kSmallRow];
+  alignas(64) double JS[kSmallRow];
+  for (int k = 0; k < m; ++k)
+    for (int i = 0; i < kSmallRow; ++i)
+      transposed[k][i] = i < n ? J[i * kSmallRow + k] : 0.0;
+  for (int i = 0; i < n; ++i) {
+    multiplyRow(J + i * kSmallRow, m, S, JS);
+    multiplyRow(JS, m, transposed[0], out + i * kSmallRow);
+  }
+}

@@ -14,5 +14,6 @@ makeKernel(const char* instruction_set)
           squaredResiduals,
           placePoints,
           meetRays,
-          sumOverCells};
+          sumOverCells,
+          congruence};
 }

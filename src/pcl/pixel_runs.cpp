@@ -44,20 +44,34 @@ PixelRuns::joinRows(int above, int here)
   }
 }
 
+namespace {
+
+/// Whether a pixel goes on where the one before is; none does after the last. Without
+/// branches, so that several pixels are looked at at once; comparisons with NaN are
+/// false: an invalid pixel ends a run.
+void
+compareNeighbors(const float* __restrict value,
+                 int width,
+                 float jump,
+                 char* __restrict continues)
+{
+  for (int i = 1; i < width; ++i)
+    continues[i] = std::abs(value[i] - value[i - 1]) < jump ? 1 : 0;
+  continues[width] = 0;
+}
+
+} // namespace
+
 void
 PixelRuns::addRow(int row, PixelRange columns)
 {
   const float* value = values_.row(row);
   const int here = static_cast<int>(runs_.size());
   const int width = std::max(columns.end - columns.begin, 0);
-  // Whether a pixel goes on where the one before is: without branches first, several
-  // pixels at a time. Comparisons with NaN are false: an invalid pixel ends a run.
   continues_.resize(static_cast<std::size_t>(width) + 1);
   char* const continues = continues_.data();
   const float* const first = value + columns.begin;
-  for (int i = 1; i < width; ++i)
-    continues[i] = std::abs(first[i] - first[i - 1]) < jump_.in_row;
-  continues[width] = false;
+  compareNeighbors(first, width, jump_.in_row, continues);
   for (int begin = 0; begin < width;) {
     const void* const stop =
         std::memchr(continues + begin + 1, 0, static_cast<std::size_t>(width - begin));

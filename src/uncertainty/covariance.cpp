@@ -1,7 +1,8 @@
 #include "covariance.h"
 
+#include "congruence.h"
+
 #include "fit/models/models.h"
-#include "geometry/congruence.h"
 
 #include "second_order.h"
 #include "stagewise.h"
@@ -227,7 +228,7 @@ SmallRows
 noiseOf(const Linearization& l)
 {
   constexpr int kTheta = kernel::kMaxTheta;
-  SmallRows C;
+  SmallRows C(kPatternTerms);
   for (int i = 0; i < kPatternTerms; ++i)
     for (int j = 0; j < kPatternTerms; ++j) {
       const bool theta_i = i < kTheta, theta_j = j < kTheta;
@@ -258,15 +259,15 @@ firstOrderCovariance(const PatchJacobian& F,
   // blocked product costs several times the work.
   const ByTheta G = gain(F.middleCols<6>(JointLayout::kTheta), inverse);
   const ByMoments M = F.middleCols<9>(JointLayout::kMean) + G.lazyProduct(l.A);
-  SmallRows J;
   const int n = static_cast<int>(G.rows());
+  SmallRows J(n);
   for (int i = 0; i < n; ++i) {
     for (int k = 0; k < 6; ++k)
       J(i, k) = G(i, k);
     for (int k = 0; k < 9; ++k)
       J(i, 6 + k) = M(i, k);
   }
-  auto covariance = J.congruence<ParameterMatrix>(n, kPatternTerms, noiseOf(l));
+  auto covariance = J.congruence<ParameterMatrix>(noiseOf(l));
   if (fit.has_plane_stage)
     covariance +=
         planeStageCovariance(fit,
@@ -282,9 +283,7 @@ template <typename Jacobian>
 ParameterMatrix
 propagated(const Jacobian& J, const ParameterMatrix& S)
 {
-  return SmallRows(J).congruence<ParameterMatrix>(static_cast<int>(J.rows()),
-                                                  static_cast<int>(J.cols()),
-                                                  SmallRows(S));
+  return SmallRows(J).congruence<ParameterMatrix>(SmallRows(S));
 }
 
 // Covariance of the joint variables (JointLayout).
