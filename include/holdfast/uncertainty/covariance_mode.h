@@ -16,9 +16,9 @@ enum class CovarianceMode : std::uint8_t {
   /// Exact, plus the second-order terms of the stages after the fit, with the shift of
   /// the mean. For few points and strong noise.
   SecondOrder,
-  /// The paper's chain, eqs. (3) to (17), with its independence assumptions: errors that
-  /// pixels share have no place in it, and of a sensor with a pattern it gives what
-  /// independent errors of the same size would.
+  /// The paper's chain, eqs. (3) to (17), with its independence assumptions: errors
+  /// that pixels share have no place in it, and of a sensor with a pattern it gives
+  /// what independent errors of the same size would.
   Stagewise,
   /// Resample and refit, 1000 times: the referee
   /// (holdfast/uncertainty/monte_carlo.h).
