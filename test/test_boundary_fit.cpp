@@ -6,6 +6,7 @@
 
 #include "fit/boundary_fit.h"
 #include "geometry/symmetric.h"
+#include <holdfast/geometry/constants.h>
 #include <holdfast/geometry/rotation.h>
 
 #include <Eigen/Eigenvalues>
@@ -74,14 +75,18 @@ randomInput(PatchType type, Model model, Random& random)
   in.type = type;
   in.surface.model = model;
   in.surface.R = random.rotation();
-  in.surface.k = Eigen::Vector3d(random.sign() * random.uniform(2.0, 3.5),
-                                 random.uniform(-1.0, 1.0),
-                                 random.sign() * random.uniform(4.5, 6.0));
-  const Eigen::Vector3d sigma(random.uniform(0.07, 0.1),
+  // In braces the numbers are drawn in their order, whatever the compiler.
+  const Eigen::Vector3d k{random.uniform(2.0, 3.5),
+                          random.uniform(-1.0, 1.0),
+                          random.uniform(4.5, 6.0)};
+  const Eigen::Vector3d signs{random.sign(), 1.0, random.sign()};
+  in.surface.k = signs.cwiseProduct(k);
+  const Eigen::Vector3d sigma{random.uniform(0.07, 0.1),
                               random.uniform(0.04, 0.06),
-                              random.uniform(0.005, 0.01));
+                              random.uniform(0.005, 0.01)};
+  const Eigen::Matrix3d near_surface = nearby(in.surface.R, random);
   const Eigen::Matrix3d axes =
-      nearby(in.surface.R, random) * expMap({0.0, 0.0, random.uniform(-3.0, 3.0)});
+      near_surface * expMap({0.0, 0.0, random.uniform(-3.0, 3.0)});
   in.scatter.count = 100;
   in.scatter.mean = random.uniformVector(-0.2, 0.2);
   in.scatter.covariance = axes * sigma.cwiseAbs2().asDiagonal() * axes.transpose();
@@ -194,6 +199,10 @@ expectJacobian(const Input& in)
              derivative([&](const Eigen::VectorXd& x) -> Eigen::VectorXd {
                return difference(at(x).state, bounded.state);
              }));
+  // The chart of r is cut at pi: differences across are none.
+  constexpr double kFarFromCut = 0.05;
+  if (kPi - bounded.patch.r.norm() < kFarFromCut)
+    return;
   expectRows(parametersByAxes(bounded.axes, bounded.squared_bound) * in_axes,
              derivative([&](const Eigen::VectorXd& x) -> Eigen::VectorXd {
                return pack(at(x).patch);

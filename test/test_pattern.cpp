@@ -187,11 +187,9 @@ TEST(Pattern, OverCellsIsNearTheSumOverAllPairs)
     if (patch % 2 == 1)
       pattern = {{{0.089, 2.1, PatternShape::Exponential},
                   {0.103, 79.0, PatternShape::Exponential}}};
-    PointBatch batch = disc(radius,
-                            stride,
-                            random.uniform(-4.0, 4.0),
-                            random.uniform(0.0, 1.0),
-                            pattern);
+    const double curvature = random.uniform(-4.0, 4.0);
+    PointBatch batch =
+        disc(radius, stride, curvature, random.uniform(0.0, 1.0), pattern);
     const Comparison found = compare(batch);
     EXPECT_NEAR(found.nees, 1.0, 0.15) << radius << " px, stride " << stride;
     EXPECT_NEAR(found.offset, 1.0, 0.2) << radius << " px, stride " << stride;
@@ -206,11 +204,10 @@ TEST(Pattern, CanBeToldFromWhiteErrors)
 {
   Random random;
   for (int patch = 0; patch < 10; ++patch) {
-    PointBatch batch = disc(random.uniform(10.0, 30.0),
-                            2,
-                            random.uniform(-4.0, 4.0),
-                            random.uniform(0.0, 1.0),
-                            kinectPattern());
+    const double radius = random.uniform(10.0, 30.0);
+    const double curvature = random.uniform(-4.0, 4.0);
+    PointBatch batch =
+        disc(radius, 2, curvature, random.uniform(0.0, 1.0), kinectPattern());
     FitOptions options;
     options.surface = SurfaceRequest::Paraboloid;
     options.separate_pattern = true;

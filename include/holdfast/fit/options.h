@@ -96,7 +96,8 @@ struct FitOptions {
   /// The final exact Newton step is repeated while it is longer than this, in sigmas.
   /// The covariance is taken before the last step, and is right to about this (patches
   /// that fill a small part of the view) to twenty times this (noise that bends with
-  /// the surface).
+  /// the surface). The default's digits are had from sums in single precision but for
+  /// what cancels; whoever asks for more gets doubles, at half the speed.
   double polish_tolerance_sigma = 1e-6;
   /// Points whose covariance is (nearly) zero are given this isotropic sigma, m.
   double sigma_floor_m = 1e-6;

@@ -1,7 +1,7 @@
 // What the surface models have in common.
 //
 // A model is a struct of static functions, one header each; models.h chooses among
-// them. The mathematics per point is in fit/kernel_point.inl, in the same order of
+// them. The mathematics per point is in fit/kernel_surface.inl, in the same order of
 // theta (kernel::Model). Beside what ModelBase gives it, a model has
 //
 //   kFirstRotation      theta[kFirstRotation .. kShapeParameters) are rotations
