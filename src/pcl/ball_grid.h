@@ -2,8 +2,8 @@
 ///
 /// In place of a k-d tree, since the radius is known beforehand. Measured with ten
 /// million points: PCL's tree (FLANN) takes three times the memory of the points
-/// themselves, three times as long to build and twice as long to ask
-/// (holdfast_files_benchmark, balls); nanoflann's takes half the memory of this grid,
+/// themselves, four times as long to build and twice as long to ask
+/// (holdfast_scale_benchmark, balls); nanoflann's takes half the memory of this grid,
 /// and longer than FLANN's to ask.
 #pragma once
 
