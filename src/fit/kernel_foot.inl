@@ -4,7 +4,8 @@
 //   FootSearch<Surface>   find(points, i, Foot&) finds the feet of kLanes points and
 //   adds
 //                         to cost and L, which reduce(CovarianceSums&) writes;
-//                         allMeet(): no ray was within a quarter of missing so far
+//                         allMeet(): no ray was within a quarter of missing so far (and
+//                         none too grazing for the digits of the number)
 //
 // With s the smaller root of f - s V + s^2 w = 0, the foot p = q - s t lies on the
 // surface and E = s^2 V / 2. Its derivatives close up where the expansion by f, V and w

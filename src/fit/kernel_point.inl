@@ -73,7 +73,7 @@ template <typename Surface>
 class FootSearch {
 public:
   HOLDFAST_INLINE explicit FootSearch(const Surface& surface)
-  : surface_(surface), smallest_(1.0)
+  : surface_(surface), smallest_(1.0), slack_(1.0)
   {
     setZero(sums_);
   }
@@ -94,6 +94,10 @@ public:
     const Number inverse = local.weight / local.V, h = local.f * inverse;
     const Number x = 1.0 - h * local.w * inverse * 4.0;
     smallest_ = selectLess(x, smallest_, x, smallest_);
+    const Number* S = local.noise.S;
+    const Number slack =
+        local.V - dot(local.g, local.g) * (S[0] + S[3] + S[5]) * kGrazing;
+    slack_ = selectLess(slack, slack_, slack, slack_);
     const Number quarter(0.25);
     const Number root = squareRoot(selectLess(x, quarter, quarter, x));
     const Number V_over_D = 1.0 / root;
@@ -113,6 +117,13 @@ public:
     return allLess(Number(0.25), smallest_);
   }
 
+  // Whether the surface lies across the noise of every point so far: else V is a small
+  // share of what Sigma holds, and digits of Sigma are lost in it.
+  HOLDFAST_INLINE bool allAcross() const
+  {
+    return allLess(Number(0.0), slack_);
+  }
+
   void reduce(CovarianceSums& out) const
   {
     reduceL(sums_, out);
@@ -120,8 +131,11 @@ public:
 
 private:
   const Surface& surface_;
+  static constexpr double kGrazing = 1e-3; // a surface seen at 88 degrees
+
   LTotals::Of<Number> sums_;
   Number smallest_; // 1 - tau
+  Number slack_; // V less its least share
 };
 
 #include "kernel_foot.inl"

@@ -60,7 +60,7 @@ public:
 
   HOLDFAST_INLINE bool allMeet() const
   {
-    return search_.allMeet();
+    return search_.allMeet() && search_.allAcross();
   }
 
   void reduce(CovarianceSums& out) const
