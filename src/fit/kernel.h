@@ -1,10 +1,10 @@
 /// \file The hot path: sums over the points of one neighbourhood.
 ///
 /// Raw pointers and plain structs only. The per-point mathematics is written once, for
-/// any number type: `double` gives the readable reference, vectors of doubles and floats
-/// the fast version, chosen at run time. It starts with the surfaces
-/// (src/fit/kernel_surface.inl), goes on to an evaluation (kernel_evaluation.inl) and the
-/// covariance pass (kernel_foot.inl; where rays all but miss, kernel_point.inl).
+/// any number type: `double` gives the readable reference, vectors of doubles and
+/// floats the fast version, chosen at run time. It starts with the surfaces
+/// (src/fit/kernel_surface.inl), goes on to an evaluation (kernel_evaluation.inl) and
+/// the covariance pass (kernel_foot.inl; where rays all but miss, kernel_point.inl).
 /// Everything on the sums is ordinary C++ elsewhere.
 ///
 /// Notation, in the local frame q = R^T (q_world - c), Sigma = R^T Sigma_world R:
