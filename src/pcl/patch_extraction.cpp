@@ -394,11 +394,11 @@ sortOut(std::vector<ExtractedPatch> attempts,
       ++result.turned_down[patch.validation->verdict];
   }
   // In place: a patch with its covariance is some kilobytes.
-  const auto isWanted = [&](const ExtractedPatch& patch) {
-    return options.keep_failures || isAccepted(patch) ||
-           (options.keep_turned_down && isUsable(patch.fit.status));
+  const auto isUnwanted = [&](const ExtractedPatch& patch) {
+    return !options.keep_failures && !isAccepted(patch) &&
+           !(options.keep_turned_down && isUsable(patch.fit.status));
   };
-  attempts.erase(std::stable_partition(attempts.begin(), attempts.end(), isWanted),
+  attempts.erase(std::remove_if(attempts.begin(), attempts.end(), isUnwanted),
                  attempts.end());
   result.patches = std::move(attempts);
 }
@@ -431,7 +431,10 @@ noteLimit(std::size_t tried, std::size_t seeds, std::vector<std::string>& notice
 std::vector<ExtractedPatch>
 acceptedAmong(std::vector<ExtractedPatch> attempts)
 {
-  attempts.erase(std::stable_partition(attempts.begin(), attempts.end(), isAccepted),
+  const auto isRejected = [](const ExtractedPatch& patch) {
+    return !isAccepted(patch);
+  };
+  attempts.erase(std::remove_if(attempts.begin(), attempts.end(), isRejected),
                  attempts.end());
   return attempts;
 }
