@@ -169,10 +169,12 @@ wantedCells(const Eigen::AlignedBox2d& box,
   if (options.cell_size_m)
     return (box.sizes() / *options.cell_size_m).prod();
   int in_box = 0;
+  const double left = box.min().x(), right = box.max().x();
+  const double low = box.min().y(), high = box.max().y();
   const double *x = points.x(), *y = points.y();
+  // Without branches, so that several points are looked at at once.
   for (int i = 0; i < points.size(); ++i)
-    in_box += (x[i] >= box.min().x()) & (x[i] <= box.max().x()) &
-              (y[i] >= box.min().y()) & (y[i] <= box.max().y());
+    in_box += (x[i] >= left) & (x[i] <= right) & (y[i] >= low) & (y[i] <= high);
   return in_box / options.points_per_cell;
 }
 
