@@ -20,6 +20,12 @@ load(const double* p)
   return Number(hn::Load(kTag, p));
 }
 
+HWY_INLINE Number
+loadAnywhere(const double* p)
+{
+  return Number(hn::LoadU(kTag, p));
+}
+
 HWY_INLINE void
 store(Number x, double* p)
 {

@@ -4,7 +4,8 @@
 //
 //   Number                    arithmetic type with + - * / among itself and with double
 //   kLanes                    points per Number
-//   load(const double*)       kLanes consecutive doubles
+//   load(const double*)       kLanes consecutive doubles, aligned as those of a batch
+//   loadAnywhere(const double*)   the same, however they are aligned
 //   store(Number, double*)    the reverse
 //   sumOfLanes(Number)        their sum
 //   sumsOfLanes(const Number*, double*)
@@ -579,7 +580,7 @@ meetRays(const double* x,
   }
   C -= 2.0 * o[2];
   for (int i = 0; i < count; i += kLanes) {
-    const Number ray[3] = {load(x + i), load(y + i), Number(1.0)};
+    const Number ray[3] = {loadAnywhere(x + i), loadAnywhere(y + i), Number(1.0)};
     Number d[3];
     rotateIntoFrame(R, ray, d);
     // f(o + t d) = A t^2 + 2 B t + C with f of paper eq. (1).

@@ -20,6 +20,12 @@ load(const double* p)
   return *p;
 }
 
+double
+loadAnywhere(const double* p)
+{
+  return *p;
+}
+
 void
 store(double x, double* p)
 {
