@@ -64,9 +64,11 @@ private:
 ///
 /// Problem has: `State`; `kSize`, the n below; `Evaluation` with members `cost`,
 /// `gradient` (n) and `JtJ` (n x n); `void evaluate(const State&, Evaluation&) const`;
-/// and `State retract(const State&, const Step&) const`. \param state start; on return
-/// the solution, or the best state seen. \param evaluation on return the evaluation
-/// there, or, when converged, within
+/// and `State retract(const State&, const Step&) const`.
+///
+/// \param state start; on return the solution, or the best state seen.
+///
+/// \param evaluation on return the evaluation there, or, when converged, within
 ///        step_tolerance_sigma of it.
 template <typename Problem>
 LevenbergMarquardtSummary

@@ -1,5 +1,5 @@
-/// \file Cholesky factors of small symmetric matrices of fixed size. Eigen's take four
-/// times as long for them, and a fit asks for a dozen.
+/// \file Cholesky factors of small symmetric matrices of fixed size: a fit asks for a
+/// dozen, with pivots and inverses, and Eigen's are made for matrices of any size.
 #pragma once
 
 #include <Eigen/Core>

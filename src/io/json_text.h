@@ -1,8 +1,7 @@
 /// \file JSON as text, written straight away.
 ///
 /// For the patches, of which there may be a hundred thousand with some hundred numbers
-/// each: nlohmann's tree of values takes several times as long, and its printer four
-/// times as long as std::to_chars. Everything else goes through nlohmann.
+/// each: nlohmann would build a tree of values first. Everything else goes through it.
 #pragma once
 
 #include <Eigen/Core>

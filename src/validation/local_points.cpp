@@ -2,24 +2,13 @@
 
 #include "patch_form.h"
 
+#include "fit/surface_fit.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 
 namespace holdfast {
-namespace {
-
-kernel::Points
-viewOf(const PointBatch& points)
-{
-  kernel::Points view{};
-  for (int i = 0; i <= PointBatch::SZZ; ++i)
-    view.channel[i] = points.channel(static_cast<PointBatch::Channel>(i));
-  view.padded_size = points.paddedSize();
-  return view;
-}
-
-} // namespace
 
 LocalPoints::LocalPoints(const Patch& patch, const PointBatch& points)
 {
@@ -56,7 +45,7 @@ LocalPoints::place(const Patch& patch, const PointBatch& points)
   size_ = points.size();
   // The origins are subtracted first, so that patches far from zero lose no precision.
   kernel::kernel().placePoints(
-      viewOf(points),
+      kernelPoints(points),
       patchForm(patch, patch.pose().R, patch.c - points.origin()),
       placed_);
   leaveOutInvalid();

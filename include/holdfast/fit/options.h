@@ -97,7 +97,7 @@ struct FitOptions {
   /// The covariance is taken before the last step, and is right to about this (patches
   /// that fill a small part of the view) to twenty times this (noise that bends with
   /// the surface). The default's digits are had from sums in single precision but for
-  /// what cancels; whoever asks for more gets doubles, at half the speed.
+  /// what cancels; whoever asks for more gets doubles, which take longer.
   double polish_tolerance_sigma = 1e-6;
   /// Points whose covariance is (nearly) zero are given this isotropic sigma, m.
   double sigma_floor_m = 1e-6;

@@ -27,8 +27,7 @@ struct ExtractionOptions {
   FitOptions fit; ///< its viewpoint is set from the sensor pose and normal_side
   CovarianceMode covariance = CovarianceMode::Exact;
   /// Limits that turn patches down, by default what is no patch of that radius; with
-  /// nothing here, which saves a fifth of the time of a fit, patches are not even
-  /// measured.
+  /// nothing here patches are not even measured.
   std::optional<ValidationOptions> validation = ValidationOptions();
   /// Patches of which better ones have more than this share of the points are left out;
   /// 1: none are. Better means more of it covered by points, a chi-square nearer to
