@@ -33,7 +33,7 @@ void
 attach(const PatchFit& fit, const PatchCovariance& uncertainty, FitResult& result)
 {
   result.chi2_expected = expectedChi2(fit);
-  result.status = statusOf(fit, uncertainty);
+  result.status = statusOf(fit.bounded.patch, uncertainty);
   if (!isUsable(result.status))
     return;
   const Linearity linearity = linearityOf(fit, uncertainty);

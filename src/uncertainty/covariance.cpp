@@ -442,26 +442,25 @@ expectedChi2(const PatchFit& fit)
 }
 
 FitStatus
-statusOf(const PatchFit& fit, const PatchCovariance& uncertainty)
+statusOf(const Patch& patch, const PatchCovariance& uncertainty)
 {
   if (uncertainty.state.size() == 0 || !uncertainty.state.allFinite())
     return FitStatus::NonFinite;
-  const PatchType type = fit.bounded.patch.type;
+  const PatchType type = patch.type;
   const bool has_axis = type.surface == SurfaceType::CircularCylinder;
   // No covariance: its terms have cancelled down to rounding.
   const bool is_degenerate =
       !isPositiveSemiDefiniteByPivots(uncertainty.state) ||
       !isPositiveSemiDefiniteByPivots(uncertainty.parameters) ||
-      (has_axis && !(curvatureInSigmas(fit.bounded.patch, uncertainty.parameters) >=
-                     kNoCurvatureSigmas)) ||
+      (has_axis &&
+       !(curvatureInSigmas(patch, uncertainty.parameters) >= kNoCurvatureSigmas)) ||
       tiltSigma(type, uncertainty.state) > kUndeterminedTilt;
   return is_degenerate ? FitStatus::Degenerate : FitStatus::Converged;
 }
 
 Linearity
-linearityOf(const PatchFit& fit, const PatchCovariance& uncertainty)
+linearityOf(const Patch& patch, const PatchCovariance& uncertainty)
 {
-  const Patch& patch = fit.bounded.patch;
   const ParameterMatrix& S = uncertainty.parameters;
   const double axis = axisSigma(patch, S), curvature = curvatureInSigmas(patch, S);
   const bool round = patch.type.surface == SurfaceType::Sphere;
@@ -474,8 +473,7 @@ linearityOf(const PatchFit& fit, const PatchCovariance& uncertainty)
   const double least_sigmas = round  ? kUnobservableSigmas :
                               second ? kSecondOrderSigmas :
                                        kLinearSigmas;
-  flags.curvature_not_observable =
-      !(curvature >= least_sigmas) || isCentreBeyondReach(fit);
+  flags.curvature_not_observable = !(curvature >= least_sigmas);
   flags.orientation_singular =
       isAtEndOfChart(patch, tiltSigma(patch.type, uncertainty.state));
   linearity.nonlinearity =
@@ -483,6 +481,15 @@ linearityOf(const PatchFit& fit, const PatchCovariance& uncertainty)
                proxyOfNonlinearity(axis,
                                    round ? std::numeric_limits<double>::infinity() :
                                            curvature);
+  return linearity;
+}
+
+Linearity
+linearityOf(const PatchFit& fit, const PatchCovariance& uncertainty)
+{
+  Linearity linearity = linearityOf(fit.bounded.patch, uncertainty);
+  if (isCentreBeyondReach(fit))
+    linearity.flags.curvature_not_observable = true;
   return linearity;
 }
 

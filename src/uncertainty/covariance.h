@@ -43,7 +43,7 @@ PatchCovariance patchCovariance(const PatchFit& fit,
 double expectedChi2(const PatchFit& fit);
 
 /// Converged; Degenerate or NonFinite where the state's covariance is none.
-FitStatus statusOf(const PatchFit& fit, const PatchCovariance& uncertainty);
+FitStatus statusOf(const Patch& patch, const PatchCovariance& uncertainty);
 
 /// How far from linear the parameters are in the points, and what of them is therefore
 /// not known (FitFlags).
@@ -53,5 +53,8 @@ struct Linearity {
 };
 
 Linearity linearityOf(const PatchFit& fit, const PatchCovariance& uncertainty);
+
+/// The same of a patch whose points are not there to say how far away its centre is.
+Linearity linearityOf(const Patch& patch, const PatchCovariance& uncertainty);
 
 } // namespace holdfast

@@ -20,9 +20,10 @@ BEGIN {
   allowed["uncertainty"] = uncertainty
   allowed["front"] = uncertainty " uncertainty"
   allowed["validation"] = "geometry patch fit"
+  allowed["fusion"] = uncertainty " uncertainty sensor"
   allowed["simulation"] = "ground geometry patch sensor"
-  allowed["evaluation"] = allowed["front"] " front validation sensor simulation"
-  allowed["pcl"] = allowed["front"] " front validation sensor"
+  allowed["evaluation"] = allowed["front"] " front validation sensor simulation fusion"
+  allowed["pcl"] = allowed["front"] " front validation sensor fusion"
   allowed["io"] = allowed["pcl"] " pcl"
   # Headers above the rooms: the front door, and what all may know.
   room["patch_estimator"] = "front"

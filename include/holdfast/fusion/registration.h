@@ -1,0 +1,59 @@
+/// \file Where a frame was taken, from its patches and those of a map.
+#pragma once
+
+#include <holdfast/fusion/patch_map.h>
+
+#include <vector>
+
+namespace holdfast {
+
+struct RegistrationOptions {
+  int max_iterations = 20;
+  /// In the first iterations a pair counts less beyond this many sigmas of its own
+  /// (Huber, on the Mahalanobis distance of its six numbers); then the map's gate
+  /// decides whether it counts.
+  int robust_iterations = 4;
+  double robust_distance = 4.0;
+  /// Iterations stop when a step moves no part of the pose by more, in its own sigmas.
+  double step_tolerance_sigma = 1e-3;
+  /// Directions of the pose (scaled to the sensor's distance from the patches) whose
+  /// information is below this share of the largest are not observable: flat ground
+  /// tells nothing of x, y and yaw. They stay as the guess has them.
+  double smallest_information = 1e-3;
+  int min_pairs = 6;
+};
+
+enum class RegistrationStatus : std::uint8_t {
+  Converged,
+  IterationLimit,
+  TooFewPairs, ///< the pose is the guess
+  NotObservable ///< in no direction at all; the pose is the guess
+};
+
+struct RegistrationResult {
+  RegistrationStatus status = RegistrationStatus::TooFewPairs;
+  Pose pose; ///< of the sensor, frame of the map
+  /// Of (delta, c), R <- R Exp(delta), c in the axes of the map, rad and m: of what the
+  /// data tell, zero along the null space. The map counts as if its patches did not
+  /// share errors.
+  JetMatrix covariance = JetMatrix::Zero();
+  /// Unit directions of (delta, c) that the data do not determine, one column each.
+  Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 6> null_space{6, 0};
+  int iterations = 0;
+  int pairs = 0; ///< measurements that counted in the end
+  int gated = 0; ///< measurements with a patch near that the gate refused
+  int unmatched =
+      0; ///< without a patch near, or whose patch another one matched better
+  /// Sum of the squared Mahalanobis distances of the pairs; six for each on average.
+  double chi2 = 0.0;
+};
+
+/// The pose of the sensor at which its measurements fit the map best, from a guess that
+/// is off by less than the map's association radius at the patches. Every patch of the
+/// map is used once.
+RegistrationResult registerPatches(const std::vector<Measurement>& measurements,
+                                   const PatchMap& map,
+                                   const Pose& guess,
+                                   const RegistrationOptions& options = {});
+
+} // namespace holdfast

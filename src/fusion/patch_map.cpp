@@ -1,0 +1,651 @@
+#include <holdfast/fusion/patch_map.h>
+
+#include <holdfast/fusion/roughness.h>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+
+#include <boost/math/distributions/chi_squared.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <stdexcept>
+#include <utility>
+
+namespace holdfast {
+namespace {
+
+constexpr int kNone = -1;
+
+// The support's moments forget: of more points than this the older ones count half.
+constexpr double kMostPoints = 10'000.0;
+
+void
+requireValid(const std::string& error)
+{
+  if (!error.empty())
+    throw std::invalid_argument("holdfast::PatchMap: " + error);
+}
+
+bool
+isPose(const Pose& pose)
+{
+  constexpr double kRounding = 1e-6; // of a rotation that came through a file
+  return pose.R.allFinite() && pose.c.allFinite() &&
+         (pose.R.transpose() * pose.R).isIdentity(kRounding) &&
+         pose.R.determinant() > 0.0;
+}
+
+/// Of the error of a pose: what it must be not to be a claim.
+std::string
+covarianceError(const JetMatrix& S)
+{
+  constexpr double kRounding = 1e-9;
+  if (!S.allFinite())
+    return "the covariance of a pose must be finite";
+  if (S.isZero(0.0))
+    return "the covariance of a pose must not be zero: nobody knows one exactly";
+  if (!S.isApprox(S.transpose(), kRounding))
+    return "the covariance of a pose must be symmetric";
+  const Eigen::SelfAdjointEigenSolver<JetMatrix> solver(S, Eigen::EigenvaluesOnly);
+  if (solver.eigenvalues()[0] < -kRounding * solver.eigenvalues()[5])
+    return "the covariance of a pose must be positive semi-definite";
+  return "";
+}
+
+/// Largest magnitude of a principal curvature, from kxx kxy kyy of a surface that is
+/// nearly level.
+double
+strongestCurvature(const JetVector& jet)
+{
+  const double mean = 0.5 * (jet[3] + jet[5]), half = 0.5 * (jet[3] - jet[5]);
+  return std::abs(mean) + std::hypot(half, jet[4]);
+}
+
+Eigen::Vector3d
+centreOf(const MapPatch& patch)
+{
+  return patch.anchor.toWorld({0.0, 0.0, patch.jet.value()[0]});
+}
+
+bool
+isFit(const Measurement& m)
+{
+  return m.jet.value.allFinite() && m.jet.white.allFinite() &&
+         m.jet.pattern.allFinite() && isPose(m.anchor) && m.radius_m > 0.0 &&
+         std::isfinite(m.radius_m) &&
+         (m.jet.covariance().diagonal().array() > 0.0).all();
+}
+
+/// Adds the moments of a view, given in its own axes, in the plane of the anchor.
+void
+addMoments(const Measurement& m, const Pose& in_anchor, std::array<double, 6>& sums)
+{
+  const Eigen::Matrix2d W = in_anchor.R.topLeftCorner<2, 2>();
+  Eigen::Matrix2d M;
+  M << m.moments[0], m.moments[1], m.moments[1], m.moments[2];
+  const Eigen::Vector2d c = in_anchor.c.head<2>();
+  const Eigen::Matrix2d S = W * M * W.transpose() + c * c.transpose();
+  const double n = m.points;
+  const double added[6] =
+      {n, n * c.x(), n * c.y(), n * S(0, 0), n * S(0, 1), n * S(1, 1)};
+  for (std::size_t i = 0; i < sums.size(); ++i)
+    sums[i] += added[i];
+  if (sums[0] > kMostPoints)
+    for (double& sum : sums)
+      sum *= 0.5;
+}
+
+/// Covariance of xx xy yy in the axes of the anchor.
+Eigen::Matrix3d
+turnedMoments(const Eigen::Matrix3d& S, const Pose& in_anchor)
+{
+  const double a = in_anchor.R(0, 0), b = in_anchor.R(0, 1), c = in_anchor.R(1, 0),
+               d = in_anchor.R(1, 1);
+  Eigen::Matrix3d T;
+  T << a * a, 2.0 * a * b, b * b, a * c, a * d + b * c, b * d, c * c, 2.0 * c * d,
+      d * d;
+  return T * S * T.transpose();
+}
+
+void
+addView(const Measurement& m, const Pose& anchor, MapPatch& patch)
+{
+  const Pose in_anchor = patch.anchor.inverse() * anchor;
+  addMoments(m, in_anchor, patch.moments);
+  const Packed<3> S = Packed<3>::of(turnedMoments(m.moments_covariance, in_anchor));
+  std::copy(S.v.begin(), S.v.end(), patch.moments_covariance.begin());
+  // A point of the anchor's plane as the measurement's own grid has it.
+  const Pose inverse = in_anchor.inverse();
+  patch.support.add(m.support,
+                    inverse.R.topLeftCorner<2, 2>() * (patch.radius_m / m.radius_m),
+                    inverse.c.head<2>() / m.radius_m);
+  patch.chi2 += m.chi2;
+  patch.chi2_expected += m.chi2_expected;
+  patch.chi2_per_roughness += m.design.chi2_per_roughness;
+  ++patch.views;
+  patch.conflicts = 0;
+}
+
+} // namespace
+
+std::string
+validityError(const PatchMapOptions& o)
+{
+  const auto positive = [](double x) { return x > 0.0 && std::isfinite(x); };
+  if (!positive(o.radius_m) || !positive(o.min_radius_m))
+    return "radii must be positive";
+  if (!positive(o.association_radius) || o.association_radius > 1.0)
+    return "the association radius must be in (0, 1]";
+  if (!(o.gate_level > 0.0 && o.gate_level < 1.0))
+    return "the level of the gate must be in (0, 1)";
+  if (!positive(o.max_tilt_rad) || !positive(o.max_normal_angle_rad))
+    return "angles must be positive";
+  if (!positive(o.s3_floor_per_m2) || !positive(o.s3_limit_per_m2))
+    return "third derivatives must be positive";
+  if (o.max_views < 1 || o.conflicts_to_replace < 1)
+    return "numbers of views and conflicts must be positive";
+  if (!(o.pattern_length >= 0.0) || !std::isfinite(o.pattern_length))
+    return "the length of the pattern must not be negative";
+  if (!positive(o.max_depth_change))
+    return "the change of depth must be positive";
+  if (!positive(o.volume_radius_m) || !positive(o.max_height_sigma_m))
+    return "the limits of the map must be positive";
+  return "";
+}
+
+double
+MapPatch::roughness(double floor) const
+{
+  const double excess = chi2 - chi2_expected;
+  if (!(excess > 0.0 && chi2_per_roughness > 0.0))
+    return floor;
+  return std::max(floor, std::sqrt(excess / chi2_per_roughness));
+}
+
+Sight
+sightOf(const WantedSeed& seed, double depth_m, double sigma_m)
+{
+  constexpr double kSigmas = 3.0;
+  if (!std::isfinite(depth_m))
+    return Sight::Hidden;
+  const double reach = kSigmas * std::hypot(seed.depth_sigma_m, sigma_m) +
+                       seed.radius_m; // the surface falls away within a patch
+  if (depth_m < seed.position.z() - reach)
+    return Sight::Hidden;
+  return depth_m > seed.position.z() + reach ? Sight::SeenThrough : Sight::Seen;
+}
+
+PatchMap::PatchMap(const PatchMapOptions& options) : options_(options)
+{
+  requireValid(validityError(options));
+  gate_ = boost::math::quantile(
+      boost::math::complement(boost::math::chi_squared(6.0), options.gate_level));
+  rebuild();
+}
+
+PatchMap::PatchMap(Snapshot snapshot) : PatchMap(snapshot.options)
+{
+  std::uint64_t last = 0;
+  for (const MapPatch& patch : snapshot.patches) {
+    requireValid(patch.id > last && patch.id < snapshot.next_id ?
+                     "" :
+                     "the patches of a map must be in the order of their ids");
+    requireValid(isPose(patch.anchor) && patch.jet.value().allFinite() &&
+                         patch.radius_m > 0.0 ?
+                     "" :
+                     "a patch of a map is not finite");
+    last = patch.id;
+  }
+  requireValid(isPose(snapshot.pose) && snapshot.frames >= 0 ? "" :
+                                                               "the pose is not one");
+  pose_ = snapshot.pose;
+  frames_ = snapshot.frames;
+  next_id_ = snapshot.next_id;
+  patches_ = std::move(snapshot.patches);
+  rebuild();
+}
+
+PatchMap::Snapshot
+PatchMap::snapshot() const
+{
+  return {options_, pose_, frames_, next_id_, patches_};
+}
+
+void
+PatchMap::move(const Pose& increment, const JetMatrix& covariance)
+{
+  requireValid(isPose(increment) ? "" : "an increment must be a finite pose");
+  requireValid(covarianceError(covariance));
+  const Pose before = pose_;
+  pose_ = before * increment;
+  // To the axes of the map: delta is in those of the new sensor frame, c of the old.
+  JetMatrix T = JetMatrix::Zero();
+  T.topLeftCorner<3, 3>() = pose_.R;
+  T.bottomRightCorner<3, 3>() = before.R;
+  pose_covariance_.reset();
+  const JetMatrix in_map = T * covariance * T.transpose();
+  for (MapPatch& patch : patches_)
+    patch.jet.inflate(errorOf(in_map, patch.jet.value(), patch.anchor));
+}
+
+void
+PatchMap::place(const Pose& pose, const JetMatrix& covariance)
+{
+  requireValid(isPose(pose) ? "" : "a pose must be finite");
+  requireValid(covarianceError(covariance));
+  pose_ = pose;
+  JetMatrix T = JetMatrix::Identity();
+  T.topLeftCorner<3, 3>() = pose.R;
+  pose_covariance_ = T * covariance * T.transpose();
+}
+
+// What an error of the sensor's pose, pivoting about the sensor, does to a jet.
+// \param covariance of (omega, t), frame of the map
+JetMatrix
+PatchMap::errorOf(const JetMatrix& covariance,
+                  const JetVector& jet,
+                  const Pose& anchor) const
+{
+  JetMatrix turn = JetMatrix::Zero();
+  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = anchor.R.transpose();
+  const JetMatrix G = jetByMotion(jet, anchor.toLocal(pose_.c)) * turn;
+  return G * covariance * G.transpose();
+}
+
+std::vector<WantedSeed>
+PatchMap::wantedSeeds(const Camera& camera) const
+{
+  constexpr double kSmallestCosine = 0.17; // 80 degrees: beyond, nothing is measured
+  std::vector<WantedSeed> wanted;
+  for (const MapPatch& patch : patches_) {
+    const Eigen::Vector3d p = pose_.toLocal(centreOf(patch));
+    if (!(p.z() > 0.0))
+      continue;
+    const Eigen::Vector2d pixel = camera.project(p);
+    if (!(pixel.x() >= 0.0 && pixel.x() <= camera.width - 1 && pixel.y() >= 0.0 &&
+          pixel.y() <= camera.height - 1))
+      continue;
+    const Eigen::Vector3d n = pose_.R.transpose() * patch.anchor.R.col(2);
+    const double cosine = -n.dot(p.normalized());
+    if (cosine < kSmallestCosine)
+      continue;
+    const double height = std::sqrt(patch.jet.covariance()(0, 0));
+    wanted.push_back({patch.id, p, pixel, patch.radius_m, height / cosine});
+  }
+  return wanted;
+}
+
+double
+PatchMap::reach() const
+{
+  return options_.association_radius * options_.radius_m;
+}
+
+void
+PatchMap::listCandidates(const Pose& anchor, std::uint64_t asked_by)
+{
+  candidates_.clear();
+  const double largest = reach();
+  const double cosine = std::cos(options_.max_normal_angle_rad);
+  visitNear(anchor.c, [&](int i) {
+    const MapPatch& patch = patches_[static_cast<std::size_t>(i)];
+    const double distance = (patch.anchor.c - anchor.c).norm();
+    if (distance < largest && patch.anchor.R.col(2).dot(anchor.R.col(2)) > cosine)
+      candidates_.push_back({i, patch.id == asked_by ? -1.0 : distance});
+  });
+  // The one that asked first, then by distance; of equals the older.
+  std::sort(candidates_.begin(),
+            candidates_.end(),
+            [](const Candidate& a, const Candidate& b) {
+              return std::pair(a.distance, a.index) < std::pair(b.distance, b.index);
+            });
+}
+
+const MapPatch*
+PatchMap::find(std::uint64_t id) const
+{
+  const auto at = std::lower_bound(
+      patches_.begin(),
+      patches_.end(),
+      id,
+      [](const MapPatch& patch, std::uint64_t x) { return patch.id < x; });
+  return at != patches_.end() && at->id == id ? &*at : nullptr;
+}
+
+const MapPatch*
+PatchMap::nearest(const Measurement& measurement, const Pose& sensor) const
+{
+  const Pose anchor = sensor * measurement.anchor;
+  const double cosine = std::cos(options_.max_normal_angle_rad);
+  const MapPatch* best = nullptr;
+  double least = reach();
+  visitNear(anchor.c, [&](int i) {
+    const MapPatch& patch = patches_[static_cast<std::size_t>(i)];
+    const double distance = (patch.anchor.c - anchor.c).norm();
+    if (distance < least && patch.anchor.R.col(2).dot(anchor.R.col(2)) > cosine) {
+      least = distance;
+      best = &patch;
+    }
+  });
+  return best;
+}
+
+UpdateReport
+PatchMap::update(const std::vector<Measurement>& measurements,
+                 const std::vector<std::uint64_t>& seen_through)
+{
+  ++frames_;
+  UpdateReport report;
+  order_.resize(measurements.size());
+  std::iota(order_.begin(), order_.end(), 0);
+  const auto at = [&](int i) -> const Measurement& {
+    return measurements[static_cast<std::size_t>(i)];
+  };
+  std::sort(order_.begin(), order_.end(), [&](int a, int b) {
+    return at(a).id < at(b).id;
+  });
+  for (std::size_t i = 1; i < order_.size(); ++i)
+    requireValid(at(order_[i - 1]).id < at(order_[i]).id ?
+                     "" :
+                     "measurements of a frame must have different ids");
+  for (const int i : order_)
+    take(at(i), report);
+  for (const std::uint64_t id : seen_through)
+    if (const MapPatch* patch = find(id); patch && patch->taken_in != frames_) {
+      ++report.seen_through;
+      conflict(patches_[static_cast<std::size_t>(patch - patches_.data())],
+               nullptr,
+               report);
+    }
+  split(report);
+  merge(report);
+  forget(report);
+  return report;
+}
+
+void
+PatchMap::take(const Measurement& m, UpdateReport& report)
+{
+  if (!isFit(m)) {
+    ++report.unfit;
+    return;
+  }
+  const Pose anchor = pose_ * m.anchor;
+  listCandidates(anchor, m.asked_by);
+  MapPatch* refused = nullptr;
+  bool is_near = false;
+  for (const Candidate& candidate : candidates_) {
+    MapPatch& patch = patches_[static_cast<std::size_t>(candidate.index)];
+    const double distance = (patch.anchor.c - anchor.c).norm();
+    if (strongestCurvature(patch.jet.value()) * distance > options_.max_tilt_rad)
+      continue;
+    is_near = true;
+    if (patch.taken_in == frames_)
+      continue;
+    if (patch.restarts || fuse(m, anchor, patch)) {
+      if (patch.restarts)
+        restart(m, anchor, patch.radius_m, patch);
+      patch.taken_in = patch.last_seen = frames_;
+      ++report.fused;
+      return;
+    }
+    if (!refused)
+      refused = &patch;
+  }
+  if (refused)
+    conflict(*refused, &m, report);
+  else if (is_near)
+    ++report.surplus;
+  else {
+    bear(m, anchor);
+    ++report.born;
+  }
+}
+
+bool
+PatchMap::fuse(const Measurement& m, const Pose& anchor, MapPatch& patch) const
+{
+  const ThirdToJet by_third =
+      movedThirdToJet(m.design.by_third, patch.anchor.inverse() * anchor);
+  const auto jet = transported(m.jet, anchor, patch.anchor, by_third);
+  if (!jet)
+    return false;
+  JetMatrix white = jet->white + modelError(by_third,
+                                            thirdToJetOfDisc(patch.radius_m),
+                                            patch.roughness(options_.s3_floor_per_m2));
+  if (pose_covariance_)
+    white += errorOf(*pose_covariance_, jet->value, patch.anchor);
+  const Eigen::Vector3d p = m.anchor.c;
+  const Eigen::Vector2d direction = p.head<2>() / p.z();
+  const double moved = (direction - patch.epoch_direction).norm();
+  const bool is_new_epoch = jet->pattern.isZero(0.0) ||
+                            moved > 2.0 * options_.pattern_length ||
+                            std::abs(p.z() - patch.epoch_depth_m) >
+                                options_.max_depth_change * patch.epoch_depth_m;
+  JetFilter filter = patch.jet;
+  if (is_new_epoch) {
+    filter.beginEpoch(jet->pattern);
+    if (patch.epochs >= options_.max_views)
+      filter.fade(1.0 + 1.0 / options_.max_views);
+  }
+  if (!(filter.distance(jet->value, white) <= gate_) ||
+      !filter.update(jet->value, white))
+    return false;
+  patch.jet = filter;
+  if (is_new_epoch) {
+    ++patch.epochs;
+    patch.epoch_direction = direction;
+    patch.epoch_depth_m = p.z();
+  }
+  addView(m, anchor, patch);
+  return true;
+}
+
+void
+PatchMap::restart(const Measurement& m,
+                  const Pose& anchor,
+                  double radius_m,
+                  MapPatch& patch) const
+{
+  const std::uint64_t id = patch.id;
+  patch = MapPatch();
+  patch.id = id;
+  patch.anchor = anchor;
+  patch.radius_m = radius_m;
+  Jet jet = m.jet;
+  jet.white += modelError(m.design.by_third,
+                          thirdToJetOfDisc(radius_m),
+                          options_.s3_floor_per_m2);
+  if (pose_covariance_)
+    jet.white += errorOf(*pose_covariance_, jet.value, anchor);
+  patch.jet = JetFilter(jet);
+  patch.epoch_direction = m.anchor.c.head<2>() / m.anchor.c.z();
+  patch.epoch_depth_m = m.anchor.c.z();
+  patch.epochs = 1;
+  patch.taken_in = patch.last_seen = frames_;
+  addView(m, anchor, patch);
+}
+
+void
+PatchMap::bear(const Measurement& m, const Pose& anchor)
+{
+  patches_.emplace_back();
+  patches_.back().id = next_id_++;
+  restart(m, anchor, options_.radius_m, patches_.back());
+  insert(static_cast<int>(patches_.size()) - 1);
+}
+
+// A patch that something speaks against; what was measured there, if anything, takes
+// its place when that has happened too often.
+void
+PatchMap::conflict(MapPatch& patch, const Measurement* m, UpdateReport& report)
+{
+  patch.taken_in = frames_;
+  if (++patch.conflicts < options_.conflicts_to_replace) {
+    report.gated += m ? 1 : 0;
+    return;
+  }
+  if (!m) {
+    patch.radius_m = 0.0;
+    ++report.forgotten;
+    return;
+  }
+  const std::uint64_t id = next_id_++;
+  const Pose anchor = pose_ * m->anchor;
+  patch.radius_m = 0.0;
+  patches_.emplace_back();
+  patches_.back().id = id;
+  restart(*m, anchor, options_.radius_m, patches_.back());
+  insert(static_cast<int>(patches_.size()) - 1);
+  ++report.replaced;
+}
+
+void
+PatchMap::split(UpdateReport& report)
+{
+  constexpr double kMisfit = 2.0; // chi2 over its expectation
+  for (MapPatch& patch : patches_)
+    if (patch.last_seen == frames_ && patch.chi2 > kMisfit * patch.chi2_expected &&
+        patch.roughness(options_.s3_floor_per_m2) > options_.s3_limit_per_m2 &&
+        0.5 * patch.radius_m >= options_.min_radius_m && !patch.restarts) {
+      patch.radius_m *= 0.5;
+      patch.restarts = true;
+      ++report.split;
+    }
+}
+
+bool
+PatchMap::isWorse(const MapPatch& patch, const MapPatch& other) const
+{
+  const double a = patch.jet.covariance()(0, 0), b = other.jet.covariance()(0, 0);
+  return std::pair(a, patch.id) > std::pair(b, other.id);
+}
+
+void
+PatchMap::merge(UpdateReport& report)
+{
+  is_dropped_.assign(patches_.size(), 0);
+  const double nearest = 0.5 * reach();
+  for (std::size_t i = 0; i < patches_.size(); ++i) {
+    const MapPatch& patch = patches_[i];
+    if (patch.last_seen != frames_ || patch.radius_m == 0.0 || is_dropped_[i])
+      continue;
+    visitNear(patch.anchor.c, [&](int j) {
+      const auto k = static_cast<std::size_t>(j);
+      const MapPatch& other = patches_[k];
+      const double distance = (patch.anchor.c - other.anchor.c).norm();
+      if (k == i || is_dropped_[i] || is_dropped_[k] || other.radius_m == 0.0 ||
+          distance >= nearest || other.radius_m != patch.radius_m ||
+          strongestCurvature(patch.jet.value()) * distance > options_.max_tilt_rad)
+        return;
+      const Jet jet{other.jet.value(), other.jet.covariance(), JetMatrix::Zero()};
+      const ThirdToJet by_third =
+          movedThirdToJet(thirdToJetOfDisc(other.radius_m),
+                          patch.anchor.inverse() * other.anchor);
+      const auto moved = transported(jet, other.anchor, patch.anchor, by_third);
+      // Both rest on points they share: never are they fused.
+      if (moved && patch.jet.distance(moved->value, moved->white) <= gate_)
+        is_dropped_[isWorse(patch, other) ? i : k] = 1;
+    });
+  }
+  for (std::size_t i = 0; i < patches_.size(); ++i)
+    if (is_dropped_[i]) {
+      patches_[i].radius_m = 0.0;
+      ++report.merged;
+    }
+}
+
+void
+PatchMap::forget(UpdateReport& report)
+{
+  const double most = options_.max_height_sigma_m * options_.max_height_sigma_m;
+  const auto isLost = [&](const MapPatch& patch) {
+    if (patch.radius_m == 0.0)
+      return true; // given up, and counted as that
+    const bool lost =
+        !((patch.anchor.c - pose_.c).norm() <= options_.volume_radius_m) ||
+        !(patch.jet.covariance()(0, 0) <= most);
+    report.forgotten += lost ? 1 : 0;
+    return lost;
+  };
+  const auto end = std::remove_if(patches_.begin(), patches_.end(), isLost);
+  if (end == patches_.end())
+    return;
+  patches_.erase(end, patches_.end());
+  rebuild();
+}
+
+// Cells of the map's frame, in buckets: any two places nearer than a cell are in
+// adjacent ones.
+std::size_t
+PatchMap::bucketOf(const Eigen::Vector3d& place, int dx, int dy, int dz) const
+{
+  constexpr double kCell = 0.8; // radii; more than the association radius may be
+  const double cell = std::max(kCell * options_.radius_m, reach());
+  std::uint64_t hash = 0;
+  const int offset[3] = {dx, dy, dz};
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto i =
+        static_cast<std::int64_t>(std::floor(place[axis] / cell)) + offset[axis];
+    hash = (hash ^ static_cast<std::uint64_t>(i)) * 0x9E3779B97F4A7C15ULL;
+    hash ^= hash >> 29;
+  }
+  return hash & (first_.size() - 1);
+}
+
+void
+PatchMap::insert(int index)
+{
+  const auto i = static_cast<std::size_t>(index);
+  if (patches_.size() > first_.size()) {
+    rebuild();
+    return;
+  }
+  int& first = first_[bucketOf(patches_[i].anchor.c, 0, 0, 0)];
+  next_.resize(patches_.size());
+  next_[i] = first;
+  first = index;
+}
+
+void
+PatchMap::rebuild()
+{
+  constexpr std::size_t kFewest = 1024;
+  std::size_t buckets = std::max(kFewest, first_.size());
+  while (buckets < 2 * patches_.size())
+    buckets *= 2;
+  first_.assign(buckets, kNone);
+  next_.assign(patches_.size(), kNone);
+  for (std::size_t i = 0; i < patches_.size(); ++i) {
+    int& first = first_[bucketOf(patches_[i].anchor.c, 0, 0, 0)];
+    next_[i] = first;
+    first = static_cast<int>(i);
+  }
+}
+
+template <typename Visit>
+void
+PatchMap::visitNear(const Eigen::Vector3d& place, Visit&& visit) const
+{
+  // Two cells may share a bucket, whose patches are visited once all the same.
+  std::array<std::size_t, 27> buckets;
+  int count = 0;
+  for (int dx = -1; dx <= 1; ++dx)
+    for (int dy = -1; dy <= 1; ++dy)
+      for (int dz = -1; dz <= 1; ++dz) {
+        const std::size_t bucket = bucketOf(place, dx, dy, dz);
+        const auto end = buckets.begin() + count;
+        if (std::find(buckets.begin(), end, bucket) == end)
+          buckets[static_cast<std::size_t>(count++)] = bucket;
+      }
+  for (int b = 0; b < count; ++b)
+    for (int i = first_[buckets[static_cast<std::size_t>(b)]]; i != kNone;
+         i = next_[static_cast<std::size_t>(i)])
+      if (patches_[static_cast<std::size_t>(i)].radius_m > 0.0)
+        visit(i);
+}
+
+} // namespace holdfast

@@ -1,0 +1,138 @@
+#include <holdfast/fusion/roughness.h>
+
+#include <Eigen/Cholesky>
+
+namespace holdfast {
+namespace {
+
+/// x^3/6, x^2 y/2, x y^2/2, y^3/6.
+Eigen::Vector4d
+cubicBasis(double x, double y)
+{
+  return {x * x * x / 6.0, x * x * y / 2.0, x * y * y / 2.0, y * y * y / 6.0};
+}
+
+/// The jet at 0 of a cubic's terms of lower degree, once it is written about another
+/// origin u and has lost its cubic terms there.
+ThirdToJet
+shiftOfThird(const Eigen::Vector2d& origin)
+{
+  const double u = origin.x(), v = origin.y();
+  ThirdToJet B;
+  // clang-format off
+  B << u * u * u / 6.0, u * u * v / 2.0, u * v * v / 2.0, v * v * v / 6.0,
+       -u * u / 2.0, -u * v, -v * v / 2.0, 0.0,
+       0.0, -u * u / 2.0, -u * v, -v * v / 2.0,
+       u, v, 0.0, 0.0,
+       0.0, u, v, 0.0,
+       0.0, 0.0, u, v;
+  // clang-format on
+  return B;
+}
+
+/// Third derivatives in axes that are the columns of W, from those in the old ones.
+Eigen::Matrix4d
+turnOfThird(const Eigen::Matrix2d& W)
+{
+  // The derivative along three directions, of which e have the second axis.
+  const auto along =
+      [](const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
+        return Eigen::RowVector4d(
+            a[0] * b[0] * c[0],
+            a[0] * b[0] * c[1] + a[0] * b[1] * c[0] + a[1] * b[0] * c[0],
+            a[0] * b[1] * c[1] + a[1] * b[0] * c[1] + a[1] * b[1] * c[0],
+            a[1] * b[1] * c[1]);
+      };
+  const Eigen::Vector2d x = W.col(0), y = W.col(1);
+  Eigen::Matrix4d T;
+  T << along(x, x, x), along(x, x, y), along(x, y, y), along(y, y, y);
+  return T;
+}
+
+/// The jet at 0 of a quadric with a jet at u in axes that are the columns of W.
+JetMatrix
+shiftOfJet(const Eigen::Vector2d& u, const Eigen::Matrix2d& W)
+{
+  JetMatrix J = JetMatrix::Zero();
+  const Eigen::Vector2d s = -W.transpose() * u; // the new origin in the old axes
+  J.row(0) = jetBasis(s.x(), s.y());
+  Eigen::Matrix<double, 2, 6> gradient; // there, old axes
+  gradient << 0.0, 1.0, 0.0, s.x(), s.y(), 0.0, 0.0, 0.0, 1.0, 0.0, s.x(), s.y();
+  J.middleRows<2>(1) = W * gradient;
+  const double a = W(0, 0), b = W(0, 1), c = W(1, 0), d = W(1, 1);
+  J.bottomRightCorner<3, 3>() << a * a, 2.0 * a * b, b * b, a * c, a * d + b * c, b * d,
+      c * c, 2.0 * c * d, d * d;
+  return J;
+}
+
+} // namespace
+
+const Eigen::Matrix4d&
+unitThirdDerivatives()
+{
+  // clang-format off
+  static const Eigen::Matrix4d S = (Eigen::Matrix4d() <<
+      1.0, 0.0, 0.2, 0.0,
+      0.0, 0.2, 0.0, 0.2,
+      0.2, 0.0, 0.2, 0.0,
+      0.0, 0.2, 0.0, 1.0).finished();
+  // clang-format on
+  return S;
+}
+
+ThirdToJet
+thirdToJetOfDisc(double radius_m)
+{
+  // A cubic term goes into a slope as far as it correlates with it over the disc:
+  // E[x^4]/6 E[x^2] = E[x^2 y^2]/2 E[y^2] = radius^2/12.
+  const double a = radius_m * radius_m / 12.0;
+  ThirdToJet B = ThirdToJet::Zero();
+  B(1, 0) = B(1, 2) = B(2, 1) = B(2, 3) = a;
+  return B;
+}
+
+FitDesign
+designOf(const PointBatch& batch, const Pose& anchor)
+{
+  JetMatrix M = JetMatrix::Zero();
+  ThirdToJet X = ThirdToJet::Zero();
+  Eigen::Matrix4d T = Eigen::Matrix4d::Zero();
+  const Eigen::Vector3d n = anchor.R.col(2);
+  for (int i = 0; i < batch.size(); ++i) {
+    // A residual along the ray counts in sigmas of the normal's direction.
+    const double weight = 1.0 / n.dot(batch.covariance(i) * n);
+    const Eigen::Vector3d q = anchor.toLocal(batch.point(i));
+    const JetVector b = jetBasis(q.x(), q.y());
+    const Eigen::Vector4d m = cubicBasis(q.x(), q.y());
+    const JetVector weighted = weight * b;
+    M.noalias() += weighted * b.transpose();
+    X.noalias() += weighted * m.transpose();
+    T.noalias() += (weight * m) * m.transpose();
+  }
+  // Scaled to a unit diagonal: units differ by powers of the radius.
+  const JetVector scale = M.diagonal().cwiseSqrt().cwiseInverse();
+  const JetMatrix scaled = scale.asDiagonal() * M * scale.asDiagonal();
+  const ThirdToJet right = scale.asDiagonal() * X;
+  const ThirdToJet fit = scaled.ldlt().solve(right);
+  const Eigen::Matrix4d left = T - right.transpose() * fit;
+  return {scale.asDiagonal() * fit, left.cwiseProduct(unitThirdDerivatives()).sum()};
+}
+
+ThirdToJet
+movedThirdToJet(const ThirdToJet& own, const Pose& pose)
+{
+  // About the own anchor a cubic is one with the same third derivatives, in turned
+  // axes, and a quadric, which any fit reproduces.
+  const Eigen::Vector2d u = pose.c.head<2>();
+  const Eigen::Matrix2d W = pose.R.topLeftCorner<2, 2>();
+  return shiftOfThird(u) + shiftOfJet(u, W) * own * turnOfThird(W);
+}
+
+JetMatrix
+modelError(const ThirdToJet& one, const ThirdToJet& other, double s3_per_m2)
+{
+  const ThirdToJet B = one - other;
+  return s3_per_m2 * s3_per_m2 * (B * unitThirdDerivatives() * B.transpose());
+}
+
+} // namespace holdfast
