@@ -111,6 +111,14 @@ turnedMoments(const Eigen::Matrix3d& S, const Pose& in_anchor)
 }
 
 void
+beginEpochOf(const Measurement& m, MapPatch& patch)
+{
+  const Eigen::Vector3d& p = m.anchor.c;
+  patch.epoch_direction = (p.head<2>() / p.z()).cast<float>();
+  patch.epoch_depth_m = static_cast<float>(p.z());
+}
+
+void
 addView(const Measurement& m, const Pose& anchor, MapPatch& patch)
 {
   const Pose in_anchor = patch.anchor.inverse() * anchor;
@@ -420,11 +428,11 @@ PatchMap::fuse(const Measurement& m, const Pose& anchor, MapPatch& patch) const
     white += errorOf(*pose_covariance_, jet->value, patch.anchor);
   const Eigen::Vector3d p = m.anchor.c;
   const Eigen::Vector2d direction = p.head<2>() / p.z();
-  const double moved = (direction - patch.epoch_direction).norm();
-  const bool is_new_epoch = jet->pattern.isZero(0.0) ||
-                            moved > 2.0 * options_.pattern_length ||
-                            std::abs(p.z() - patch.epoch_depth_m) >
-                                options_.max_depth_change * patch.epoch_depth_m;
+  const double moved = (direction - patch.epoch_direction.cast<double>()).norm();
+  const bool is_new_epoch =
+      jet->pattern.isZero(0.0) || moved > 2.0 * options_.pattern_length ||
+      std::abs(p.z() - static_cast<double>(patch.epoch_depth_m)) >
+          options_.max_depth_change * static_cast<double>(patch.epoch_depth_m);
   JetFilter filter = patch.jet;
   if (is_new_epoch) {
     filter.beginEpoch(jet->pattern);
@@ -437,8 +445,7 @@ PatchMap::fuse(const Measurement& m, const Pose& anchor, MapPatch& patch) const
   patch.jet = filter;
   if (is_new_epoch) {
     ++patch.epochs;
-    patch.epoch_direction = direction;
-    patch.epoch_depth_m = p.z();
+    beginEpochOf(m, patch);
   }
   addView(m, anchor, patch);
   return true;
@@ -462,8 +469,7 @@ PatchMap::restart(const Measurement& m,
   if (pose_covariance_)
     jet.white += errorOf(*pose_covariance_, jet.value, anchor);
   patch.jet = JetFilter(jet);
-  patch.epoch_direction = m.anchor.c.head<2>() / m.anchor.c.z();
-  patch.epoch_depth_m = m.anchor.c.z();
+  beginEpochOf(m, patch);
   patch.epochs = 1;
   patch.taken_in = patch.last_seen = frames_;
   addView(m, anchor, patch);

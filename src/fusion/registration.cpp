@@ -23,8 +23,34 @@ struct Pair {
   JetVector residual; ///< measured less predicted, at the measurement's own anchor
   JetMatrix information; ///< of the residual
   JetMatrix by_pose; ///< of the prediction, by (delta, c) of the sensor
+  JetMatrix spurious; ///< information on the pose that is none (spuriousInformation)
   double distance; ///< squared, of the residual in its sigmas
 };
+
+/// by_pose follows from the map's jet, whose errors look like a shape that tells the
+/// pose: noise in the curvatures of a plane seems to hold it in x and y. What that adds
+/// to by_pose^T S^-1 by_pose on average.
+/// \param covariance of the prediction
+JetMatrix
+spuriousInformation(const Measurement& m,
+                    const Pose& sensor,
+                    const JetMatrix& covariance,
+                    const JetMatrix& information)
+{
+  const Eigen::Vector3d pivot = m.anchor.toLocal(Eigen::Vector3d::Zero());
+  const JetMatrix level = jetByMotion(JetVector::Zero(), pivot);
+  const Eigen::LLT<JetMatrix> root(covariance);
+  const JetMatrix L = root.matrixL();
+  JetMatrix sum = JetMatrix::Zero();
+  for (int i = 0; i < 6; ++i) {
+    const JetMatrix D = jetByMotion(L.col(i), pivot) - level;
+    sum += D.transpose() * information * D;
+  }
+  JetMatrix chain = JetMatrix::Zero();
+  chain.topLeftCorner<3, 3>() = m.anchor.R.transpose();
+  chain.bottomRightCorner<3, 3>() = m.anchor.R.transpose() * sensor.R.transpose();
+  return chain.transpose() * sum * chain;
+}
 
 /// FUSION 5: with the relative pose of the measurement's anchor in the patch's,
 /// d(phi, t) = [Rb^T 0; -Ra^T R [c]x Ra^T] d(delta, c) of the sensor.
@@ -37,13 +63,12 @@ pairAt(const Measurement& m, const MapPatch& patch, const Pose& sensor, double s
   const auto moved = movedJet(patch.jet.value(), relative, by_third);
   if (!moved)
     return std::nullopt;
-  Pair pair{&m, &patch, m.jet.value - moved->value, {}, {}, 0.0};
+  Pair pair{&m, &patch, m.jet.value - moved->value, {}, {}, {}, 0.0};
   const JetMatrix Q =
       modelError(m.design.by_third, by_third, patch.roughness(s3_floor));
   const JetMatrix& F = moved->by_jet;
-  const JetMatrix S =
-      m.jet.covariance() + F * patch.jet.covariance() * F.transpose() + Q;
-  const Eigen::LLT<JetMatrix> factor(S);
+  const JetMatrix predicted = F * patch.jet.covariance() * F.transpose();
+  const Eigen::LLT<JetMatrix> factor(JetMatrix(m.jet.covariance() + predicted + Q));
   if (factor.info() != Eigen::Success)
     return std::nullopt;
   pair.information = factor.solve(JetMatrix(JetMatrix::Identity()));
@@ -54,6 +79,7 @@ pairAt(const Measurement& m, const MapPatch& patch, const Pose& sensor, double s
   chain.bottomLeftCorner<3, 3>() = -to_patch * sensor.R * skew(m.anchor.c);
   chain.bottomRightCorner<3, 3>() = to_patch;
   pair.by_pose = moved->by_pose * chain;
+  pair.spurious = spuriousInformation(m, sensor, predicted, pair.information);
   if (!pair.by_pose.allFinite() || !std::isfinite(pair.distance))
     return std::nullopt;
   return pair;
@@ -100,6 +126,7 @@ public:
   {
     const JetMatrix weighted = weight * pair.information * pair.by_pose;
     information_ += weighted.transpose() * pair.by_pose;
+    spurious_ += weight * pair.spurious;
     gradient_ += weighted.transpose() * pair.residual;
   }
 
@@ -108,22 +135,22 @@ public:
   {
     JetVector scale = JetVector::Ones();
     scale.head<3>() /= length_m;
-    const JetMatrix scaled = scale.asDiagonal() * information_ * scale.asDiagonal();
+    const JetMatrix scaled =
+        scale.asDiagonal() * (information_ - spurious_) * scale.asDiagonal();
     const Eigen::SelfAdjointEigenSolver<JetMatrix> solver(scaled);
-    const JetVector& values = solver.eigenvalues();
-    const double least = smallest_share * values[5];
-    step_.setZero();
-    covariance_.setZero();
+    const JetVector& values = solver.eigenvalues(); // ascending
     lost_ = 0;
-    for (int i = 0; i < 6; ++i) {
-      const JetVector direction = scale.asDiagonal() * solver.eigenvectors().col(i);
-      if (!(values[i] > least)) {
-        null_space_.col(lost_++) = direction.normalized();
-        continue;
-      }
-      step_ += direction * (direction.dot(gradient_) / values[i]);
-      covariance_ += direction * direction.transpose() / values[i];
-    }
+    while (lost_ < 6 && !(values[lost_] > smallest_share * values[5]))
+      ++lost_;
+    const Directions all = scale.asDiagonal() * solver.eigenvectors();
+    null_space_ = all.leftCols(lost_).colwise().normalized();
+    const Directions seen = all.rightCols(6 - lost_);
+    const Eigen::MatrixXd inverse =
+        (seen.transpose() * information_ * seen)
+            .llt()
+            .solve(Eigen::MatrixXd::Identity(6 - lost_, 6 - lost_));
+    covariance_ = seen * inverse * seen.transpose();
+    step_ = covariance_ * gradient_;
   }
 
   const JetVector& step() const
@@ -134,9 +161,9 @@ public:
   {
     return covariance_;
   }
-  auto nullSpace() const
+  const Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 6>& nullSpace() const
   {
-    return null_space_.leftCols(lost_);
+    return null_space_;
   }
 
   /// Length of the step in sigmas.
@@ -146,11 +173,14 @@ public:
   }
 
 private:
+  using Directions = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 6>;
+
   JetMatrix information_ = JetMatrix::Zero();
+  JetMatrix spurious_ = JetMatrix::Zero();
   JetVector gradient_ = JetVector::Zero();
   JetVector step_ = JetVector::Zero();
   JetMatrix covariance_ = JetMatrix::Zero();
-  JetMatrix null_space_ = JetMatrix::Zero();
+  Directions null_space_{6, 0};
   int lost_ = 0;
 };
 

@@ -81,8 +81,8 @@ struct MapPatch {
   std::array<float, 6> moments_covariance{};
   SupportGrid support; ///< in radii of radius_m
   double chi2 = 0.0, chi2_expected = 0.0, chi2_per_roughness = 0.0; ///< sums
-  Eigen::Vector2d epoch_direction = Eigen::Vector2d::Zero(); ///< x/z, y/z at its start
-  double epoch_depth_m = 0.0;
+  Eigen::Vector2f epoch_direction = Eigen::Vector2f::Zero(); ///< x/z, y/z at its start
+  float epoch_depth_m = 0.0F;
   int views = 0;
   int epochs = 0; ///< independent views
   int conflicts = 0; ///< in a row
