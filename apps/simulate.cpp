@@ -70,9 +70,12 @@ toCloud(const RangeImage& image, bool with_covariances)
   RangeCloud cloud;
   cloud.points = std::make_shared<const pcl::PointCloud<pcl::PointXYZ>>(points);
   cloud.sensor_pose = image.sensor_pose;
-  if (with_covariances)
+  if (with_covariances) {
+    auto covariances = std::make_shared<Covariances>();
     for (const Eigen::Matrix3d& Sigma : image.covariances)
-      cloud.covariances.push_back(Sigma.cast<float>());
+      covariances->push_back(Sigma.cast<float>());
+    cloud.covariances = covariances;
+  }
   return cloud;
 }
 

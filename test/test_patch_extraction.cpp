@@ -1,7 +1,9 @@
 #include "support/extraction_seeds.h"
 #include "support/organized_cloud.h"
+#include "support/own_covariances.h"
 #include "support/random.h"
 
+#include "pcl/point_selection.h"
 #include "pcl/sampling_budget.h"
 #include <holdfast/fit/reference_points.h>
 #include <holdfast/patch/boundary.h>
@@ -274,9 +276,10 @@ RangeCloud
 withCovariances(RangeCloud cloud, const Sensor& sensor)
 {
   const Pose& pose = cloud.sensor_pose;
+  Covariances& covariances = test::ownCovariances(cloud);
   for (const pcl::PointXYZ& p : *cloud.points) {
     const Eigen::Vector3d q = pose.toLocal(p.getVector3fMap().cast<double>());
-    cloud.covariances.emplace_back(
+    covariances.emplace_back(
         (pose.R * sensor.noise->covariance(q) * pose.R.transpose()).cast<float>());
   }
   return cloud;
@@ -310,12 +313,14 @@ TEST(ExtractPatches, LeavesOutPointsWithoutACovariance)
   const RangeCloud good =
       withCovariances(makeOrganizedCloud(kCamera, rollingDepth), sensor);
   RangeCloud bad = good;
-  bad.covariances[100](1, 1) = -1e-4F;
-  bad.covariances[5000].setConstant(test::kNaN);
-  bad.covariances[9000](0, 1) = 10.0F; // not symmetric, not definite
+  Covariances& covariances = test::ownCovariances(bad);
+  covariances[100](1, 1) = -1e-4F;
+  covariances[5000].setConstant(test::kNaN);
+  covariances[9000](0, 1) = 10.0F; // not symmetric, not definite
   const ExtractionOptions options = makeOptions();
   EXPECT_EQ(extractPatches(good, sensor, options).points.invalid_covariance, 0);
   EXPECT_EQ(extractPatches(bad, sensor, options).points.invalid_covariance, 3);
+  EXPECT_EQ(selectPoints(bad, sensor).cloud.covariances, bad.covariances); // no copy
   const ExtractionResult whole = extractWhole(bad, sensor, options);
   EXPECT_EQ(whole.points.invalid_covariance, 3);
   ASSERT_EQ(whole.patches.size(), 1U);
@@ -333,9 +338,9 @@ TEST(ExtractPatches, AsksModelsThatLookAtNeighborsForTheWholeImage)
   for (const pcl::PointXYZ& p : *cloud.points)
     image.push_back(pose.toLocal(p.getVector3fMap().cast<double>()));
   RangeCloud with = cloud;
-  with.covariances =
-      sensor.noise->imageCovariances(image, kCamera.width, kCamera.height);
-  for (Eigen::Matrix3f& S : with.covariances)
+  Covariances& covariances = test::ownCovariances(with);
+  covariances = sensor.noise->imageCovariances(image, kCamera.width, kCamera.height);
+  for (Eigen::Matrix3f& S : covariances)
     S = (pose.R.cast<float>() * S * pose.R.cast<float>().transpose()).eval();
   ExtractionOptions options = makeOptions(0.08, 0.25);
   // Discs, and cut by slope alone, since the depth noise of a single point is not that

@@ -86,7 +86,7 @@ loadRecording(const std::string& path,
   recording.sensor = matchedSensor(sensorOf(info, nominal), recording.cloud, &notice);
   if (!notice.empty())
     notices.push_back(notice);
-  if (!recording.cloud.covariances.empty())
+  if (recording.cloud.hasCovariances())
     notices.emplace_back("its own covariances count, and no pattern");
   recording.cloud = withoutPatternMap(path, recording.cloud, recording.sensor, notices);
   for (const std::string& line : notices)

@@ -178,7 +178,7 @@ fitCloud(const std::string& path,
   report.file = input.file;
   report.sensor_pose = input.cloud.sensor_pose;
   report.offset = input.cloud.offset;
-  report.covariances_of_cloud = !input.cloud.covariances.empty();
+  report.covariances_of_cloud = input.cloud.hasCovariances();
   report.load_ms = loading.milliseconds();
 
   const Stopwatch fitting;

@@ -206,8 +206,9 @@ toPointCloud(const RangeCloud& cloud)
 {
   pcl::PointCloud<PointXYZCovariance> points;
   pcl::copyPointCloud(*cloud.points, points);
-  for (std::size_t i = 0; i < cloud.covariances.size(); ++i)
-    points[i].setCovariance(cloud.covariances[i]);
+  if (cloud.hasCovariances())
+    for (std::size_t i = 0; i < points.size(); ++i)
+      points[i].setCovariance((*cloud.covariances)[i]);
   writeSensorPose(cloud.sensor_pose, points);
   return points;
 }

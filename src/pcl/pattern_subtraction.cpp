@@ -60,7 +60,7 @@ subtractPatternMap(const RangeCloud& cloud, const Sensor& sensor, std::string* n
       *notice = why + ": the sensor's pattern map is not subtracted";
     return cloud;
   };
-  if (!cloud.covariances.empty())
+  if (cloud.hasCovariances())
     return leave("the cloud has covariances of its own");
   const bool organized = cloud.points->height > 1;
   const std::string error = patternMapError(sensor,

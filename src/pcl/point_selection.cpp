@@ -27,7 +27,7 @@ requireUsable(const RangeCloud& cloud, const Sensor& sensor)
 {
   if (const std::string error = validityError(cloud); !error.empty())
     throw std::invalid_argument(error);
-  if (!sensor.noise && cloud.covariances.empty())
+  if (!sensor.noise && !cloud.hasCovariances())
     throw std::invalid_argument(
         "the cloud has no covariances, and the sensor no noise model");
 }
@@ -48,8 +48,11 @@ isCovariance(const Eigen::Matrix3d& S)
 void
 dropInvalidCovariances(const RangeCloud& cloud, UnusedPoints& unused)
 {
-  for (std::size_t i = 0; i < cloud.covariances.size(); ++i)
-    if (!isCovariance(cloud.covariances[i].cast<double>()))
+  if (!cloud.hasCovariances())
+    return;
+  const Covariances& covariances = *cloud.covariances;
+  for (std::size_t i = 0; i < covariances.size(); ++i)
+    if (!isCovariance(covariances[i].cast<double>()))
       unused.drop(i, &PointAccounting::invalid_covariance);
 }
 
@@ -98,7 +101,7 @@ selectPoints(const RangeCloud& cloud, const Sensor& nominal)
   selection.sensor =
       nominal.noise ? nominal : withConstantNoise(nominal, kUnknownSigma);
   const bool model_asked =
-      cloud.covariances.empty() && nominal.noise && !nominal.noise->isOmnidirectional();
+      !cloud.hasCovariances() && nominal.noise && !nominal.noise->isOmnidirectional();
   const ViewCheck view(cloud, selection.sensor);
   UnusedPoints unused(cloud);
   if (model_asked && view.isForeign()) {

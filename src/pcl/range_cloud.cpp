@@ -10,8 +10,8 @@ validityError(const RangeCloud& cloud)
   const std::size_t n = cloud.points->size();
   if (static_cast<std::size_t>(cloud.points->width) * cloud.points->height != n)
     return "width times height of the cloud is not its number of points";
-  if (!cloud.covariances.empty() && cloud.covariances.size() != n)
-    return "the cloud has " + std::to_string(cloud.covariances.size()) +
+  if (cloud.hasCovariances() && cloud.covariances->size() != n)
+    return "the cloud has " + std::to_string(cloud.covariances->size()) +
            " covariances for " + std::to_string(n) + " points";
   if (!cloud.sensor_pose.c.allFinite())
     return "the sensor's viewpoint must be finite";

@@ -124,7 +124,7 @@ PatchConsensus::Impl::prepare()
   distance_gatherer.reset();
   fit_gatherer.reset();
   input_error = validityError(cloud);
-  if (!input_error.empty() || (!sensor.noise && cloud.covariances.empty()))
+  if (!input_error.empty() || (!sensor.noise && !cloud.hasCovariances()))
     return;
   // The model is not asked where there are covariances, but has to be there.
   Sensor model = sensor;
