@@ -7,6 +7,8 @@
 
 #include <holdfast/geometry/constants.h>
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -180,9 +182,9 @@ noteZeroPoints(int count, std::string* notice)
     return;
   if (!notice->empty())
     *notice += "; ";
-  *notice += std::to_string(count) +
-             (count == 1 ? " point at the sensor is" : " points at the sensor are") +
-             " taken as invalid";
+  *notice += fmt::format("{} at the sensor {} taken as invalid",
+                         count == 1 ? "1 point" : fmt::format("{} points", count),
+                         count == 1 ? "is" : "are");
 }
 
 } // namespace detail
