@@ -11,8 +11,11 @@
 #include <holdfast/sensor/dryanovski_noise_model.h>
 
 #include <algorithm>
+#include <array>
+#include <chrono>
 #include <cstring>
 #include <stdexcept>
+#include <thread>
 
 namespace holdfast { namespace {
 
@@ -280,6 +283,42 @@ withCovariances(RangeCloud cloud, const Sensor& sensor)
         (pose.R * sensor.noise->covariance(q) * pose.R.transpose()).cast<float>());
   }
   return cloud;
+}
+
+/// However slow the computer is: no thread begins more than one patch after the time is
+/// over, which is that of the look at the clock before the patch.
+TEST(ExtractPatches, BeginsAtMostOnePatchPerThreadWhenTheTimeIsOver)
+{
+  using Clock = SamplingBudget::Clock;
+  Random random;
+  const RangeCloud cloud = makeRollingCloud(random);
+  ExtractionOptions options = makeOptions();
+  options.threads = 3;
+  options.sampler.max_time_s = 0.03;
+  PatchSites sites;
+  sites.seeds = seedsAt(cloud, std::vector<int>(1000, 60 * kCamera.width + 80));
+  std::array<std::vector<Clock::time_point>, 3> begun;
+  sites.search = [&](const Seed&, int thread, std::vector<int>& indices) {
+    begun[static_cast<std::size_t>(thread)].push_back(Clock::now());
+    std::this_thread::sleep_for(std::chrono::milliseconds(4));
+    indices.clear();
+  };
+  extractPatches(cloud, makeSensor(kCamera), options, sites);
+  // The time began to run before the first patch.
+  Clock::time_point first = Clock::time_point::max();
+  std::size_t tried = 0;
+  for (const auto& times : begun) {
+    tried += times.size();
+    for (const Clock::time_point time : times)
+      first = std::min(first, time);
+  }
+  EXPECT_LT(tried, sites.seeds->size());
+  const auto over = first + std::chrono::duration<double>(options.sampler.max_time_s);
+  for (const auto& times : begun)
+    EXPECT_LE(std::count_if(times.begin(),
+                            times.end(),
+                            [&](Clock::time_point time) { return time > over; }),
+              1);
 }
 
 TEST(ExtractPatches, TakesTheCovariancesOfTheCloud)
