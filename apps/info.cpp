@@ -97,7 +97,7 @@ factsAbout(const std::string& path, const InputOptions& input, const Sensor& sen
   facts.sensor_pose = cloud.sensor_pose;
   facts.sensor_pose.c += cloud.offset;
   facts.camera = recoverIntrinsics(cloud, &facts.camera_rms_px);
-  facts.has_covariances = !cloud.covariances.empty();
+  facts.has_covariances = cloud.hasCovariances();
   facts.invalid_covariances = countInvalidCovariances(cloud);
   return facts;
 }

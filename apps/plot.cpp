@@ -80,18 +80,31 @@ text(const Point& at,
 {
   const std::string turn = turn_degrees == 0.0 ?
                                "" :
-                               " transform=\"rotate(" + px(turn_degrees) + ' ' +
-                                   px(at.x) + ' ' + px(at.y) + ")\"";
-  return "<text x=\"" + px(at.x) + "\" y=\"" + px(at.y) + "\" text-anchor=\"" + anchor +
-         "\" font-weight=\"" + weight + "\"" + turn + ">" + escaped(words) +
-         "</text>\n";
+                               fmt::format(R"~( transform="rotate({} {} {})")~",
+                                           px(turn_degrees),
+                                           px(at.x),
+                                           px(at.y));
+  return fmt::format(
+      R"(<text x="{}" y="{}" text-anchor="{}" font-weight="{}"{}>{}</text>)"
+      "\n",
+      px(at.x),
+      px(at.y),
+      anchor,
+      weight,
+      turn,
+      escaped(words));
 }
 
 std::string
 segment(const Point& a, const Point& b, const std::string& style)
 {
-  return "<line x1=\"" + px(a.x) + "\" y1=\"" + px(a.y) + "\" x2=\"" + px(b.x) +
-         "\" y2=\"" + px(b.y) + "\" " + style + "/>\n";
+  return fmt::format(R"(<line x1="{}" y1="{}" x2="{}" y2="{}" {}/>)"
+                     "\n",
+                     px(a.x),
+                     px(a.y),
+                     px(b.x),
+                     px(b.y),
+                     style);
 }
 
 // Distinct names of series in the order of their appearance.

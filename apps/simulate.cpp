@@ -9,6 +9,7 @@
 
 #include <CLI/CLI.hpp>
 #include <Eigen/Geometry>
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
 #include "command_line.h"
@@ -70,9 +71,12 @@ toCloud(const RangeImage& image, bool with_covariances)
   RangeCloud cloud;
   cloud.points = std::make_shared<const pcl::PointCloud<pcl::PointXYZ>>(points);
   cloud.sensor_pose = image.sensor_pose;
-  if (with_covariances)
+  if (with_covariances) {
+    auto covariances = std::make_shared<Covariances>();
     for (const Eigen::Matrix3d& Sigma : image.covariances)
-      cloud.covariances.push_back(Sigma.cast<float>());
+      covariances->push_back(Sigma.cast<float>());
+    cloud.covariances = covariances;
+  }
   return cloud;
 }
 
@@ -208,9 +212,9 @@ runSimulate(const SimulateArguments& arguments)
   const Sensor sensor = arguments.no_pattern ? withoutPattern(named) : named;
   if (sensor.pattern_map && arguments.stride > 1)
     throw CLI::ValidationError("--stride",
-                               "sensor " + sensor.name +
-                                   " has a pattern map of all its pixels; --no-pattern "
-                                   "simulates without it");
+                               fmt::format("sensor {} has a pattern map of all its "
+                                           "pixels; --no-pattern simulates without it",
+                                           sensor.name));
   if (arguments.simulation.quantize && sensor.disparity_quantum_px == 0.0)
     throw CLI::ValidationError("--quantize",
                                "sensor " + sensor.name + " has no disparity quantum");
@@ -222,9 +226,12 @@ runSimulate(const SimulateArguments& arguments)
   if (std::none_of(image.points.begin(), image.points.end(), [](const auto& point) {
         return point.allFinite();
       }))
-    throw std::runtime_error(arguments.output + ": not written, nothing of the scene " +
-                             scene.name + " lies within the range of sensor " +
-                             sensor.name);
+    throw std::runtime_error(
+        fmt::format("{}: not written, nothing of the scene {} lies "
+                    "within the range of sensor {}",
+                    arguments.output,
+                    scene.name,
+                    sensor.name));
   save(arguments.output,
        withPatternMap(toCloud(image, arguments.covariance),
                       sensor,

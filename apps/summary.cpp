@@ -4,6 +4,8 @@
 
 #include <holdfast/geometry/constants.h>
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -53,13 +55,15 @@ std::string
 heading(const PatchReport& report)
 {
   const auto patches = static_cast<double>(report.result.patches.size());
-  return report.cloud + ": " + formatNumber("%.0f", patches) +
-         (patches == 1.0 ? " patch" : " patches") + ", sensor " +
-         report.result.sensor.name + ", loaded in " +
-         formatNumber("%.0f", report.load_ms) + " ms, fitted in " +
-         formatNumber("%.1f", report.fit_ms) + " ms (" +
-         formatNumber("%.0f", 1e3 * patches / std::max(report.fit_ms, 1e-6)) +
-         " patches/s)\n";
+  return fmt::format("{}: {:.0f} {}, sensor {}, loaded in {:.0f} ms, fitted in {:.1f} "
+                     "ms ({:.0f} patches/s)\n",
+                     report.cloud,
+                     patches,
+                     patches == 1.0 ? "patch" : "patches",
+                     report.result.sensor.name,
+                     report.load_ms,
+                     report.fit_ms,
+                     1e3 * patches / std::max(report.fit_ms, 1e-6));
 }
 
 } // namespace
@@ -81,8 +85,7 @@ rejectedText(const ExtractionResult& result)
 {
   std::string text;
   const auto append = [&text](std::string_view reason, int count) {
-    text +=
-        (text.empty() ? "" : ", ") + std::string(reason) + ' ' + std::to_string(count);
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", reason, count);
   };
   for (const auto& [status, count] : result.rejected)
     append(statusName(status), count);
@@ -108,11 +111,13 @@ summaryTable(const PatchReport& report)
     rows.push_back(tableRow(surface, fits));
   const std::string rejected = rejectedText(report.result);
   const int second = report.result.second_attempts;
-  return heading(report) + formatTable(rows) +
-         (rejected.empty() ? "" : "rejected: " + rejected + "\n") +
-         (second == 0 ? "" :
-                        "of several surfaces, fitted to the seed's alone: " +
-                            std::to_string(second) + "\n");
+  std::string text = heading(report) + formatTable(rows);
+  if (!rejected.empty())
+    text += fmt::format("rejected: {}\n", rejected);
+  if (second != 0)
+    text +=
+        fmt::format("of several surfaces, fitted to the seed's alone: {}\n", second);
+  return text;
 }
 
 } // namespace holdfast::app

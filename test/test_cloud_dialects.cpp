@@ -312,10 +312,11 @@ TEST_F(CloudDialects, CovariancesOfNineNumbers)
       "FIELDS x y z covariance\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 9\n";
   const std::string nine = " 1e-6 2e-7 3e-7 2e-7 4e-6 5e-7 3e-7 5e-7 9e-6\n";
   const RangeCloud cloud = load(asciiPcd(fields, replaced(kRows, "\n", nine))).cloud;
-  ASSERT_EQ(cloud.covariances.size(), 4U);
+  ASSERT_TRUE(cloud.covariances);
+  ASSERT_EQ(cloud.covariances->size(), 4U);
   Eigen::Matrix3f expected;
   expected << 1e-6F, 2e-7F, 3e-7F, 2e-7F, 4e-6F, 5e-7F, 3e-7F, 5e-7F, 9e-6F;
-  for (const Eigen::Matrix3f& covariance : cloud.covariances)
+  for (const Eigen::Matrix3f& covariance : *cloud.covariances)
     EXPECT_EQ(covariance, expected);
   EXPECT_NE(
       complaint(
@@ -488,7 +489,7 @@ TEST_F(CloudDialects, UnitsScaleEverything)
             1e-12);
   EXPECT_LT(((*loaded.cloud.points)[1].getVector3fMap() - 1e-3F * kPoints[1]).norm(),
             1e-9F);
-  EXPECT_NEAR(loaded.cloud.covariances[0](1, 1), 2e-6F, 1e-12F);
+  EXPECT_NEAR(loaded.cloud.covariances->front()(1, 1), 2e-6F, 1e-12F);
   EXPECT_LT(((*load(asciiPly(), options).cloud.points)[1].getVector3fMap() -
              1e-3F * kPoints[1])
                 .norm(),

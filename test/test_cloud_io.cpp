@@ -1,5 +1,6 @@
 #include <holdfast/io/cloud_io.h>
 
+#include "support/own_covariances.h"
 #include "support/random.h"
 #include "support/run_program.h"
 #include "support/small_clouds.h"
@@ -95,11 +96,13 @@ TEST(CloudIo, SavedCloudsComeBackBitForBit)
     CloudFileInfo info;
     const RangeCloud loaded = loadCloud(folder + "/cloud.pcd", {}, &info);
     expectSamePoints(cloud, loaded, 0.0F);
-    ASSERT_EQ(loaded.covariances.size(), cloud.covariances.size());
-    for (std::size_t i = 0; i < cloud.covariances.size(); ++i)
+    ASSERT_TRUE(loaded.covariances);
+    ASSERT_EQ(loaded.covariances->size(), cloud.covariances->size());
+    for (std::size_t i = 0; i < cloud.covariances->size(); ++i)
       // The six numbers of the file are the upper triangle.
-      EXPECT_EQ(Eigen::Matrix3f(loaded.covariances[i].triangularView<Eigen::Upper>()),
-                Eigen::Matrix3f(cloud.covariances[i].triangularView<Eigen::Upper>()));
+      EXPECT_EQ(
+          Eigen::Matrix3f((*loaded.covariances)[i].triangularView<Eigen::Upper>()),
+          Eigen::Matrix3f((*cloud.covariances)[i].triangularView<Eigen::Upper>()));
     // VIEWPOINT has 9 digits.
     EXPECT_TRUE(loaded.sensor_pose.R.isApprox(cloud.sensor_pose.R, 1e-8));
     EXPECT_TRUE(loaded.sensor_pose.c.isApprox(cloud.sensor_pose.c, 1e-8));
@@ -373,13 +376,14 @@ TEST(CloudIo, InvalidCovariancesAreCountedNotDropped)
 {
   const std::string folder = freshFolder("cloud_io_covariances");
   RangeCloud cloud = bowlCloud(kWidth, kHeight, {}, true);
-  cloud.covariances[0].setConstant(std::nanf("")); // of the NaN point: does not count
-  cloud.covariances[5](0, 0) = std::nanf("");
-  cloud.covariances[6] *= -1.0F;
-  cloud.covariances[7](0, 1) = cloud.covariances[7](1, 0) = 1.0F;
+  Covariances& covariances = test::ownCovariances(cloud);
+  covariances[0].setConstant(std::nanf("")); // of the NaN point: does not count
+  covariances[5](0, 0) = std::nanf("");
+  covariances[6] *= -1.0F;
+  covariances[7](0, 1) = covariances[7](1, 0) = 1.0F;
   saveCloud(folder + "/bad.pcd", cloud);
   const RangeCloud loaded = loadCloud(folder + "/bad.pcd");
-  EXPECT_EQ(loaded.covariances.size(), cloud.covariances.size());
+  EXPECT_EQ(loaded.covariances->size(), covariances.size());
   EXPECT_EQ(countInvalidCovariances(loaded), 3);
   EXPECT_EQ(countValidPoints(loaded), kWidth * kHeight - 1);
 }
@@ -391,7 +395,7 @@ TEST(CloudIo, FailedSavesLeaveNothingBehind)
   EXPECT_THROW(saveCloud(folder + "/no/such/folder.pcd", cloud), std::runtime_error);
   EXPECT_THROW(saveCloud(folder, cloud), std::runtime_error);
   RangeCloud broken = cloud;
-  broken.covariances.resize(3);
+  test::ownCovariances(broken).resize(3);
   EXPECT_THROW(saveCloud(folder + "/broken.pcd", broken), std::invalid_argument);
   EXPECT_TRUE(test::filesIn(folder).empty());
 }

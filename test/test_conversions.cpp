@@ -218,7 +218,7 @@ TEST(RangeClouds, ExchangeCovariancesWithPoints)
 {
   const RangeCloud bowl = test::bowlCloud(16, 12, test::tiltedPose(), true);
   const auto points = toPointCloud(bowl).makeShared();
-  EXPECT_EQ(toRangeCloud<PointXYZCovariance>(points).covariances, bowl.covariances);
+  EXPECT_EQ(*toRangeCloud<PointXYZCovariance>(points).covariances, *bowl.covariances);
   const auto without = toPointCloud(test::bowlCloud(16, 12));
   EXPECT_TRUE(std::isnan(without[5].covariance[0]));
 }

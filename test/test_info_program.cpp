@@ -1,5 +1,6 @@
 #include <holdfast/io/cloud_io.h>
 
+#include "support/own_covariances.h"
 #include "support/run_program.h"
 #include "support/small_clouds.h"
 
@@ -17,7 +18,7 @@ TEST(InfoProgram, KnowsTheCloud)
   const std::string folder = freshFolder("info_json");
   const Pose pose = test::tiltedPose();
   RangeCloud cloud = test::bowlCloud(40, 30, pose, true);
-  cloud.covariances[7](1, 1) = -1.0F;
+  test::ownCovariances(cloud)[7](1, 1) = -1.0F;
   saveCloud(folder + "/bowl.pcd", cloud);
   const auto run = runProgram(folder, {"info", folder + "/bowl.pcd", "--json", "-"});
   ASSERT_EQ(run.exit_code, 0) << run.err;

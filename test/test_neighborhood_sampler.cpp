@@ -777,7 +777,7 @@ TEST(Degenerate, MisuseThrows)
   EXPECT_THROW(sampler.neighborhood(80 * 60, *scratch, indices), std::invalid_argument);
   EXPECT_THROW(seedsOf({}, {}), std::invalid_argument);
   RangeCloud uneven = cloud;
-  uneven.covariances.resize(3);
+  uneven.covariances = std::make_shared<const Covariances>(3);
   EXPECT_THROW(seedsOf(uneven, {}), std::invalid_argument);
 }
 

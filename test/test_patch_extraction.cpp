@@ -1,7 +1,9 @@
 #include "support/extraction_seeds.h"
 #include "support/organized_cloud.h"
+#include "support/own_covariances.h"
 #include "support/random.h"
 
+#include "pcl/point_selection.h"
 #include "pcl/sampling_budget.h"
 #include <holdfast/fit/reference_points.h>
 #include <holdfast/patch/boundary.h>
@@ -11,8 +13,11 @@
 #include <holdfast/sensor/dryanovski_noise_model.h>
 
 #include <algorithm>
+#include <array>
+#include <chrono>
 #include <cstring>
 #include <stdexcept>
+#include <thread>
 
 namespace holdfast { namespace {
 
@@ -274,12 +279,49 @@ RangeCloud
 withCovariances(RangeCloud cloud, const Sensor& sensor)
 {
   const Pose& pose = cloud.sensor_pose;
+  Covariances& covariances = test::ownCovariances(cloud);
   for (const pcl::PointXYZ& p : *cloud.points) {
     const Eigen::Vector3d q = pose.toLocal(p.getVector3fMap().cast<double>());
-    cloud.covariances.emplace_back(
+    covariances.emplace_back(
         (pose.R * sensor.noise->covariance(q) * pose.R.transpose()).cast<float>());
   }
   return cloud;
+}
+
+/// However slow the computer is: no thread begins more than one patch after the time is
+/// over, which is that of the look at the clock before the patch.
+TEST(ExtractPatches, BeginsAtMostOnePatchPerThreadWhenTheTimeIsOver)
+{
+  using Clock = SamplingBudget::Clock;
+  Random random;
+  const RangeCloud cloud = makeRollingCloud(random);
+  ExtractionOptions options = makeOptions();
+  options.threads = 3;
+  options.sampler.max_time_s = 0.03;
+  PatchSites sites;
+  sites.seeds = seedsAt(cloud, std::vector<int>(1000, 60 * kCamera.width + 80));
+  std::array<std::vector<Clock::time_point>, 3> begun;
+  sites.search = [&](const Seed&, int thread, std::vector<int>& indices) {
+    begun[static_cast<std::size_t>(thread)].push_back(Clock::now());
+    std::this_thread::sleep_for(std::chrono::milliseconds(4));
+    indices.clear();
+  };
+  extractPatches(cloud, makeSensor(kCamera), options, sites);
+  // The time began to run before the first patch.
+  Clock::time_point first = Clock::time_point::max();
+  std::size_t tried = 0;
+  for (const auto& times : begun) {
+    tried += times.size();
+    for (const Clock::time_point time : times)
+      first = std::min(first, time);
+  }
+  EXPECT_LT(tried, sites.seeds->size());
+  const auto over = first + std::chrono::duration<double>(options.sampler.max_time_s);
+  for (const auto& times : begun)
+    EXPECT_LE(std::count_if(times.begin(),
+                            times.end(),
+                            [&](Clock::time_point time) { return time > over; }),
+              1);
 }
 
 TEST(ExtractPatches, TakesTheCovariancesOfTheCloud)
@@ -310,12 +352,14 @@ TEST(ExtractPatches, LeavesOutPointsWithoutACovariance)
   const RangeCloud good =
       withCovariances(makeOrganizedCloud(kCamera, rollingDepth), sensor);
   RangeCloud bad = good;
-  bad.covariances[100](1, 1) = -1e-4F;
-  bad.covariances[5000].setConstant(test::kNaN);
-  bad.covariances[9000](0, 1) = 10.0F; // not symmetric, not definite
+  Covariances& covariances = test::ownCovariances(bad);
+  covariances[100](1, 1) = -1e-4F;
+  covariances[5000].setConstant(test::kNaN);
+  covariances[9000](0, 1) = 10.0F; // not symmetric, not definite
   const ExtractionOptions options = makeOptions();
   EXPECT_EQ(extractPatches(good, sensor, options).points.invalid_covariance, 0);
   EXPECT_EQ(extractPatches(bad, sensor, options).points.invalid_covariance, 3);
+  EXPECT_EQ(selectPoints(bad, sensor).cloud.covariances, bad.covariances); // no copy
   const ExtractionResult whole = extractWhole(bad, sensor, options);
   EXPECT_EQ(whole.points.invalid_covariance, 3);
   ASSERT_EQ(whole.patches.size(), 1U);
@@ -333,9 +377,9 @@ TEST(ExtractPatches, AsksModelsThatLookAtNeighborsForTheWholeImage)
   for (const pcl::PointXYZ& p : *cloud.points)
     image.push_back(pose.toLocal(p.getVector3fMap().cast<double>()));
   RangeCloud with = cloud;
-  with.covariances =
-      sensor.noise->imageCovariances(image, kCamera.width, kCamera.height);
-  for (Eigen::Matrix3f& S : with.covariances)
+  Covariances& covariances = test::ownCovariances(with);
+  covariances = sensor.noise->imageCovariances(image, kCamera.width, kCamera.height);
+  for (Eigen::Matrix3f& S : covariances)
     S = (pose.R.cast<float>() * S * pose.R.cast<float>().transpose()).eval();
   ExtractionOptions options = makeOptions(0.08, 0.25);
   // Discs, and cut by slope alone, since the depth noise of a single point is not that

@@ -92,7 +92,8 @@ TEST_F(PatternSubtraction, SaysWhenItDoesNotApply)
 {
   RangeCloud cloud = measuredWall({});
   std::string notice;
-  cloud.covariances.assign(cloud.points->size(), Eigen::Matrix3f::Identity());
+  cloud.covariances = std::make_shared<const Covariances>(cloud.points->size(),
+                                                          Eigen::Matrix3f::Identity());
   EXPECT_EQ(subtractPatternMap(cloud, sensor_, &notice).points, cloud.points);
   EXPECT_NE(notice.find("covariances of its own"), std::string::npos) << notice;
 

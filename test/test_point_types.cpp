@@ -159,8 +159,9 @@ TEST(PcdFiles, OfPointsWithCovariancesAreThoseOfTheProgram)
   const auto points = toPointCloud(cloud);
   pcl::PCDWriter().writeBinary(path, points);
   const RangeCloud loaded = loadCloud(path);
-  EXPECT_EQ(loaded.covariances.size(), points.size());
-  EXPECT_EQ(loaded.covariances, cloud.covariances);
+  ASSERT_TRUE(loaded.covariances);
+  EXPECT_EQ(loaded.covariances->size(), points.size());
+  EXPECT_EQ(*loaded.covariances, *cloud.covariances);
   // PCL writes VIEWPOINT with six digits.
   EXPECT_TRUE(loaded.sensor_pose.R.isApprox(cloud.sensor_pose.R, 1e-5));
 

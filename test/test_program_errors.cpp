@@ -1,5 +1,6 @@
 #include <holdfast/io/cloud_io.h>
 
+#include "support/own_covariances.h"
 #include "support/run_program.h"
 #include "support/small_clouds.h"
 
@@ -177,9 +178,10 @@ TEST_F(ProgramErrors, ResultsNeverReplaceThoseOfAnotherCloud)
 TEST_F(ProgramErrors, BadCovariancesAreCountedAndLeftOut)
 {
   const std::string some = saveWith("some.pcd", [](RangeCloud& cloud) {
-    cloud.covariances[100].setConstant(std::nanf(""));
-    cloud.covariances[200] *= -1.0F;
-    cloud.covariances[300](0, 2) = cloud.covariances[300](2, 0) = 1.0F;
+    Covariances& covariances = test::ownCovariances(cloud);
+    covariances[100].setConstant(std::nanf(""));
+    covariances[200] *= -1.0F;
+    covariances[300](0, 2) = covariances[300](2, 0) = 1.0F;
   });
   const std::string out = folder_ + "/out";
   expectError(1, {some, "-o", out, "--quiet", "--whole"}, "3 of 1199 covariances");
@@ -188,7 +190,7 @@ TEST_F(ProgramErrors, BadCovariancesAreCountedAndLeftOut)
   EXPECT_EQ(json["patches"][0]["points"], 1199 - 3);
 
   const std::string all = saveWith("all.pcd", [](RangeCloud& cloud) {
-    for (Eigen::Matrix3f& covariance : cloud.covariances)
+    for (Eigen::Matrix3f& covariance : test::ownCovariances(cloud))
       covariance *= -1.0F;
   });
   expectError(1, {all, "-o", folder_ + "/none", "--quiet"}, "1199 of 1199 covariances");

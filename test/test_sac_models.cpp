@@ -743,7 +743,7 @@ TEST(PointTypes, CovariancesInThePointsAreUsed)
       makeConsensusScene({SurfaceType::Plane, BoundaryType::Ellipse}, 0.3, random);
   RangeCloud range;
   range.points = scene.cloud;
-  range.covariances = *scene.covariances;
+  range.covariances = scene.covariances;
   const auto cloud =
       pcl::make_shared<pcl::PointCloud<PointXYZCovariance>>(toPointCloud(range));
   const SampleConsensusModelPatch<PointXYZCovariance> inside(SurfaceRequest::Plane,

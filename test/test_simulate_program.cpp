@@ -180,17 +180,20 @@ TEST_F(SimulateProgram, CovarianceFieldIsTheNoiseThatWasDrawn)
 {
   make("sphere", {"--covariance", "--noise-scale", "0.5"});
   const RangeCloud cloud = loadCloud(cloud_);
-  ASSERT_EQ(cloud.covariances.size(), cloud.points->size());
+  ASSERT_TRUE(cloud.covariances);
+  ASSERT_EQ(cloud.covariances->size(), cloud.points->size());
   EXPECT_EQ(countInvalidCovariances(cloud), 0);
   for (std::size_t i = 0; i < cloud.points->size(); ++i) {
     if (!std::isfinite((*cloud.points)[i].x))
       continue;
     const Eigen::Vector3f ray = cloud.sensor_pose.R.col(2).cast<float>();
     // Depth sigma at 1 m and half the noise: 0.5 * 3.9 mm; the ball is 0.1 m around.
-    EXPECT_NEAR(std::sqrt(ray.dot(cloud.covariances[i] * ray)), 0.5 * 3.9e-3, 0.5e-3);
+    EXPECT_NEAR(std::sqrt(ray.dot((*cloud.covariances)[i] * ray)),
+                0.5 * 3.9e-3,
+                0.5e-3);
   }
   make("sphere");
-  EXPECT_TRUE(loadCloud(cloud_).covariances.empty());
+  EXPECT_FALSE(loadCloud(cloud_).hasCovariances());
 }
 
 TEST_F(SimulateProgram, SameSeedSameFile)

@@ -158,10 +158,11 @@ TEST(PointCovariances, MoveWithPositionsAsPclMovesThem)
   pcl::PointCloud<PointXYZCovariance> by_pcl, moved;
   pcl::transformPointCloud(cloud, by_pcl, isometry(T).cast<float>());
   transformPointCloudWithCovariances(cloud, moved, isometry(T));
-  const Covariances beside = transformCovariances(bowl.covariances, isometry(T));
+  const Covariances beside = transformCovariances(*bowl.covariances, isometry(T));
   for (std::size_t i = 1; i < cloud.size(); ++i) {
     EXPECT_EQ(moved[i].getVector3fMap(), by_pcl[i].getVector3fMap());
-    EXPECT_EQ(by_pcl[i].getCovarianceMatrix(), bowl.covariances[i]); // PCL's does not
+    EXPECT_EQ(by_pcl[i].getCovarianceMatrix(),
+              (*bowl.covariances)[i]); // PCL's does not
     EXPECT_LT((moved[i].getCovarianceMatrix() - beside[i]).norm(),
               1e-6F * beside[i].norm());
   }

@@ -15,6 +15,7 @@
 #include <holdfast/version.h>
 
 #include <CLI/CLI.hpp>
+#include <fmt/core.h>
 
 #include <cmath>
 #include <cstdlib>
@@ -66,8 +67,7 @@ struct CalibrateSettings {
 std::string
 sizeText(const RangeCloud& cloud)
 {
-  return std::to_string(cloud.points->width) + " x " +
-         std::to_string(cloud.points->height);
+  return fmt::format("{} x {}", cloud.points->width, cloud.points->height);
 }
 
 /// Intrinsics recovered from points of one camera agree by much more.
@@ -126,7 +126,7 @@ public:
   {
     const std::size_t others = paths_[pose].size() - 1;
     const std::string& first = paths_[pose].front();
-    return others == 0 ? first : first + " and " + std::to_string(others) + " more";
+    return others == 0 ? first : fmt::format("{} and {} more", first, others);
   }
 
 private:
@@ -135,16 +135,22 @@ private:
     const RangeCloud& first = poses_.front().front();
     const std::string& first_path = paths_.front().front();
     if (sizeText(cloud) != sizeText(first))
-      throw std::runtime_error(path + ": " + sizeText(cloud) + " pixels, where " +
-                               first_path + " has " + sizeText(first));
+      throw std::runtime_error(fmt::format("{}: {} pixels, where {} has {}",
+                                           path,
+                                           sizeText(cloud),
+                                           first_path,
+                                           sizeText(first)));
     const Camera other = matchedSensor(nominal_, cloud).camera;
     if (!isSameCamera(other, sensor_.camera))
       throw std::runtime_error(
-          path + ": taken by another camera, with a focal length of " +
-          formatNumber("%.1f px about column ", other.fx) +
-          formatNumber("%.1f,", other.cx) + " where " + first_path + " has " +
-          formatNumber("%.1f px about ", sensor_.camera.fx) +
-          formatNumber("%.1f", sensor_.camera.cx));
+          fmt::format("{}: taken by another camera, with a focal length of {:.1f} px "
+                      "about column {:.1f}, where {} has {:.1f} px about {:.1f}",
+                      path,
+                      other.fx,
+                      other.cx,
+                      first_path,
+                      sensor_.camera.fx,
+                      sensor_.camera.cx));
   }
 
   Sensor nominal_;

@@ -3,6 +3,8 @@
 #include "command_line.h"
 #include "console.h"
 
+#include <fmt/core.h>
+
 #include <cmath>
 
 namespace holdfast::app {
@@ -39,7 +41,7 @@ intervalText(const Estimate& estimate)
 std::string
 valueAndInterval(const Estimate& estimate)
 {
-  return valueText(estimate) + " (" + intervalText(estimate) + ")";
+  return fmt::format("{} ({})", valueText(estimate), intervalText(estimate));
 }
 
 Json

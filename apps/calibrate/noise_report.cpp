@@ -9,6 +9,8 @@
 #include <holdfast/pcl/conversions.h>
 #include <holdfast/sensor/stereo_noise_model.h>
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -43,8 +45,13 @@ regionText(int size_px, const NoiseReport& report)
   if (size_px == 0)
     return "whole planes";
   const double size_m = size_px / report.sensor.camera.fx * report.found.mean_m;
-  return "squares of " + std::to_string(size_px) + " px (" +
-         formatNumber("%.1f cm)", 100.0 * size_m);
+  return fmt::format("squares of {} px ({:.1f} cm)", size_px, 100.0 * size_m);
+}
+
+std::string
+framesText(int frames)
+{
+  return frames == 1 ? "1 frame" : fmt::format("{} frames", frames);
 }
 
 std::string
@@ -52,18 +59,22 @@ headText(const NoiseReport& report)
 {
   const NoiseCalibration& found = report.found;
   const Sensor& sensor = report.sensor;
-  const std::string planes =
-      found.planes == 0 ? "small spots" :
-      found.planes == 1 ? "1 plane" :
-                          std::to_string(found.planes) + " planes";
-  return std::to_string(found.frames) + (found.frames == 1 ? " frame" : " frames") +
-         " of " + std::to_string(sensor.camera.width) + " x " +
-         std::to_string(sensor.camera.height) + ", sensor " + sensor.name +
-         ": disparity = " + formatNumber("%.4g", sensor.disparity_focal_px) + " px x " +
-         formatNumber("%.4g", sensor.baseline_m) + " m / depth\n" +
-         std::to_string(found.pixels) + " pixels of each are static and flat (" +
-         planes + "), " + formatNumber("%.2f to ", found.min_m) +
-         formatNumber("%.2f m away", found.max_m);
+  const std::string planes = found.planes == 0 ? "small spots" :
+                             found.planes == 1 ? "1 plane" :
+                                                 fmt::format("{} planes", found.planes);
+  return fmt::format("{} of {} x {}, sensor {}: disparity = {:.4g} px x {:.4g} m / "
+                     "depth\n{} pixels of each are static and flat ({}), {:.2f} to "
+                     "{:.2f} m away",
+                     framesText(found.frames),
+                     sensor.camera.width,
+                     sensor.camera.height,
+                     sensor.name,
+                     sensor.disparity_focal_px,
+                     sensor.baseline_m,
+                     found.pixels,
+                     planes,
+                     found.min_m,
+                     found.max_m);
 }
 
 Table
@@ -121,7 +132,7 @@ depthTable(const NoiseReport& report)
                "95 % interval"}};
   for (const DepthRow& row : report.found.by_depth) {
     std::vector<std::string>& cells = table.emplace_back();
-    cells = {formatNumber("%.2f to ", row.min_m) + formatNumber("%.2f", row.max_m),
+    cells = {fmt::format("{:.2f} to {:.2f}", row.min_m, row.max_m),
              std::to_string(row.pixels)};
     for (const Estimate* sigma :
          {&row.sigmas.single, &row.sigmas.temporal, &row.sigmas.fixed}) {
@@ -139,19 +150,18 @@ stepSentence(const NoiseReport& report)
   const Estimate& step = report.found.quantum;
   if (!step.isKnown())
     return "No step is seen: the disparities take any value, or depths are rounded "
-           "more "
-           "coarsely.";
+           "more coarsely.";
   const double parts = std::max(1.0, std::round(1.0 / step.value));
   const double ratio = step.value * parts;
   std::string text = "The disparities come in steps of " + digits(step.value) + " px";
   if (std::abs(ratio - 1.0) > 0.03)
     return text + ".";
-  text += ", 1/" + formatNumber("%.0f px", parts);
+  text += fmt::format(", 1/{:.0f} px", parts);
   // What four digits of f b cannot express is no difference.
   if (std::abs(ratio - 1.0) > 5e-4)
-    text += " if focal length x baseline is " +
-            formatNumber("%.4g", focalTimesBaseline(report.sensor) / ratio) +
-            " px m and not " + formatNumber("%.4g", focalTimesBaseline(report.sensor));
+    text += fmt::format(" if focal length x baseline is {:.4g} px m and not {:.4g}",
+                        focalTimesBaseline(report.sensor) / ratio,
+                        focalTimesBaseline(report.sensor));
   return text + ".";
 }
 
@@ -161,9 +171,10 @@ pointSentence(const NoiseReport& report)
   if (report.found.sigma_point.isKnown())
     return "The points scatter across the rays of their pixels; this is taken as their "
            "pointing error.";
-  return "The points lie exactly on the rays of their pixels, so that nothing can be "
-         "said about their pointing error: sigma_point_px stays " +
-         formatNumber("%.3g", nominalSigmaPoint(report.sensor)) + ".";
+  return fmt::format("The points lie exactly on the rays of their pixels, so that "
+                     "nothing can be said about their pointing error: sigma_point_px "
+                     "stays {:.3g}.",
+                     nominalSigmaPoint(report.sensor));
 }
 
 /// At twice the depth the noise is the same within 7 %.
@@ -174,17 +185,20 @@ depthSentence(const NoiseReport& report)
 {
   const Estimate& exponent = report.found.depth_exponent;
   const std::string power =
-      "in a frame it goes with depth^p, p = " + formatNumber("%.2f (", exponent.value) +
-      formatNumber("%.2f to ", exponent.low) + formatNumber("%.2f)", exponent.high);
+      fmt::format("in a frame it goes with depth^p, p = {:.2f} ({:.2f} to {:.2f})",
+                  exponent.value,
+                  exponent.low,
+                  exponent.high);
   if (!std::isfinite(exponent.low))
     return "Too little to tell whether the disparity noise depends on the depth.";
   if (std::max(std::abs(exponent.low), std::abs(exponent.high)) < kNegligibleExponent)
     return "The disparity noise is the same at all depths: " + power + ".";
   if (exponent.contains(0.0))
     return "No dependence of the disparity noise on the depth is seen: " + power + ".";
-  return std::string("The disparity noise ") +
-         (exponent.value > 0.0 ? "grows" : "falls") + " with the depth: " + power +
-         ". The model, which has it constant, is right on average.";
+  return fmt::format("The disparity noise {} with the depth: {}. The model, which has "
+                     "it constant, is right on average.",
+                     exponent.value > 0.0 ? "grows" : "falls",
+                     power);
 }
 
 /// Why small regions show less.
@@ -294,50 +308,59 @@ depthPanel(const NoiseReport& report,
   return panel;
 }
 
+std::string
+disparityComment(const NoiseReport& report)
+{
+  const NoiseCalibration& found = report.found;
+  std::string text;
+  if (report.hasPattern())
+    text = fmt::format("Of a single point, white part and pattern: {}. ",
+                       valueAndInterval(report.pattern.single));
+  text += fmt::format("Scatter about {} within a frame, with the rounding: {}.",
+                      regionText(found.region_px, report),
+                      valueAndInterval(found.sigmas.single));
+  if (found.before_rounding.single.isKnown())
+    text += fmt::format(" Before rounding: {}.",
+                        valueAndInterval(found.before_rounding.single));
+  if (found.sigmas.temporal.isKnown())
+    text += fmt::format(" Only {} of it changes from frame to frame, {} is a fixed "
+                        "pattern.",
+                        valueAndInterval(found.sigmas.temporal),
+                        valueAndInterval(found.sigmas.fixed));
+  return text + " " + depthSentence(report);
+}
+
 SensorComments
 commentsOf(const NoiseReport& report)
 {
   const NoiseCalibration& found = report.found;
   SensorComments comments;
-  comments[""] = "Measured by `holdfast calibrate` in " + std::to_string(found.frames) +
-                 (found.frames == 1 ? " frame, " : " frames, ") +
-                 std::to_string(found.pixels) +
-                 " pixels of each. In brackets: 95 % intervals.";
-  comments["camera"] = "Of sensor " + report.sensor.name +
-                       " where its rays fit the points of the frames, else recovered "
-                       "from them.";
-  comments["range"] = "Of sensor " + report.sensor.name +
-                      "; the frames held depths "
-                      "from " +
-                      formatNumber("%.2f", found.min_m) + " to " +
-                      formatNumber("%.2f m.", found.max_m);
-  comments["disparity"] = "Baseline and focal length of sensor " + report.sensor.name +
-                          ". " + stepSentence(report);
-  std::string disparity =
-      "Scatter about " + regionText(found.region_px, report) +
-      " within a frame, with the rounding: " + valueAndInterval(found.sigmas.single) +
-      ".";
-  if (found.before_rounding.single.isKnown())
-    disparity +=
-        " Before rounding: " + valueAndInterval(found.before_rounding.single) + ".";
-  if (found.sigmas.temporal.isKnown())
-    disparity += " Only " + valueAndInterval(found.sigmas.temporal) +
-                 " of it changes from frame to frame, " +
-                 valueAndInterval(found.sigmas.fixed) + " is a fixed pattern.";
-  comments["noise.sigma_disparity_px"] = disparity + " " + depthSentence(report);
-  if (report.hasPattern()) {
-    comments["noise.sigma_disparity_px"] =
-        "Of a single point, white part and pattern: " +
-        valueAndInterval(report.pattern.single) + ". " +
-        comments["noise.sigma_disparity_px"];
+  const std::string& sensor = report.sensor.name;
+  comments[""] =
+      fmt::format("Measured by `holdfast calibrate` in {}, {} pixels of each. "
+                  "In brackets: 95 % intervals.",
+                  framesText(found.frames),
+                  found.pixels);
+  comments["camera"] = fmt::format("Of sensor {} where its rays fit the points of the "
+                                   "frames, else recovered from them.",
+                                   sensor);
+  comments["range"] = fmt::format("Of sensor {}; the frames held depths from {:.2f} to "
+                                  "{:.2f} m.",
+                                  sensor,
+                                  found.min_m,
+                                  found.max_m);
+  comments["disparity"] = fmt::format("Baseline and focal length of sensor {}. {}",
+                                      sensor,
+                                      stepSentence(report));
+  comments["noise.sigma_disparity_px"] = disparityComment(report);
+  if (report.hasPattern())
     comments["noise.pattern"] = patternComment(report);
-  }
   if (report.hasMap() && !report.hasPattern()) // else said there
     comments["noise.pattern_map"] = patternMapSentence(report);
   comments["noise.sigma_point_px"] =
-      found.sigma_point.isKnown() ?
-          "Scatter across the rays: " + valueAndInterval(found.sigma_point) + "." :
-          pointSentence(report);
+      found.sigma_point.isKnown() ? fmt::format("Scatter across the rays: {}.",
+                                                valueAndInterval(found.sigma_point)) :
+                                    pointSentence(report);
   return comments;
 }
 
@@ -438,10 +461,12 @@ measurePatternMap(const std::vector<std::vector<RangeCloud>>& poses,
 std::string
 noiseReportText(const NoiseReport& report)
 {
-  std::string text = headText(report) + "\n\n" + formatTable(sigmaTable(report)) +
-                     "\n" + formatTable(patternTable(report)) + "\n" +
-                     formatTable(sizeTable(report)) + "\n" +
-                     formatTable(depthTable(report)) + "\n";
+  std::string text = fmt::format("{}\n\n{}\n{}\n{}\n{}\n",
+                                 headText(report),
+                                 formatTable(sigmaTable(report)),
+                                 formatTable(patternTable(report)),
+                                 formatTable(sizeTable(report)),
+                                 formatTable(depthTable(report)));
   for (const std::string& sentence : sentences(report))
     text += sentence + "\n";
   return text;

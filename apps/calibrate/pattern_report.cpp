@@ -1,9 +1,10 @@
 #include "pattern_report.h"
 
-#include "console.h"
 #include "estimate_text.h"
 
 #include <holdfast/sensor/names.h>
+
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>
@@ -42,13 +43,14 @@ poseSentence(const NoiseReport& report)
   if (report.pattern.poses == 1)
     return "One pose: the shape of the surfaces themselves is part of the pattern. "
            "Frames from another place, as --pose, tell how much belongs to the camera.";
-  return std::to_string(report.pattern.poses) +
-         " poses: " + valueAndInterval(report.pattern.shared_part) +
-         " of the variance between points 8 to 75 px apart" +
-         (report.hasMap() ? ", before the map," : "") +
-         " is in the same pixels of "
-         "other poses and belongs to the camera; the rest changes with time or "
-         "distance, or is the shape of the surfaces.";
+  return fmt::format(
+      "{} poses: {} of the variance between points 8 to 75 px apart{} is "
+      "in the same pixels of other poses and belongs to the camera; the "
+      "rest changes with time or distance, or is the shape of the "
+      "surfaces.",
+      report.pattern.poses,
+      valueAndInterval(report.pattern.shared_part),
+      report.hasMap() ? ", before the map," : "");
 }
 
 /// Estimates over the distance, and their intervals as vertical lines.
@@ -203,14 +205,13 @@ patternMapSentence(const NoiseReport& report)
   const PatternMapCalibration& map = report.map;
   if (!report.hasMap())
     return "";
-  return "The map of the fixed pattern knows " +
-         formatNumber("%.0f", 100.0 * map.known_part) +
-         " % of the pixels. The map of the other poses takes what the planes of one "
-         "leave from " +
-         formatNumber("%.3f to ", map.before_px) +
-         formatNumber("%.3f px rms, the pixels seen by two or more; the pattern is ",
-                      map.after_px) +
-         "what is left then.";
+  return fmt::format("The map of the fixed pattern knows {:.0f} % of the pixels. The "
+                     "map of the other poses takes what the planes of one leave from "
+                     "{:.3f} to {:.3f} px rms, the pixels seen by two or more; the "
+                     "pattern is what is left then.",
+                     100.0 * map.known_part,
+                     map.before_px,
+                     map.after_px);
 }
 
 Json
@@ -248,11 +249,13 @@ roundedPattern(const NoiseReport& report)
 std::string
 patternComment(const NoiseReport& report)
 {
-  std::string text = "What neighbouring pixels share of it; white: " +
-                     valueAndInterval(report.pattern.white) + ".";
+  std::string text = fmt::format("What neighbouring pixels share of it; white: {}.",
+                                 valueAndInterval(report.pattern.white));
   for (const WaveEstimate& wave : report.pattern.waves)
-    text += " " + shapeText(wave) + ": sigma " + valueAndInterval(wave.sigma) +
-            " over " + valueAndInterval(wave.length) + " px.";
+    text += fmt::format(" {}: sigma {} over {} px.",
+                        shapeText(wave),
+                        valueAndInterval(wave.sigma),
+                        valueAndInterval(wave.length));
   for (const std::string& sentence : patternSentences(report))
     text += " " + sentence;
   return text;

@@ -1,6 +1,6 @@
 #include "consistency_rows.h"
 
-#include "console.h"
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>
@@ -48,13 +48,14 @@ columnsText(const std::vector<ConsistencyColumn>& columns)
   std::string text;
   for (const ConsistencyColumn& column : columns)
     if (column.state.count > 0)
-      text +=
-          (text.empty() ? "" : "; ") +
-          (std::isfinite(column.up_to) ? "up to " + formatNumber("%g", column.up_to) :
-                                         std::string("above")) +
-          ": " + formatNumber("%.3g", column.state.nees_per_dof) + " (" +
-          formatNumber("%.1f", 100.0 * column.state.coverage95) + " %, " +
-          std::to_string(column.state.count) + " fits)";
+      text += fmt::format("{}{}: {:.3g} ({:.1f} %, {} fits)",
+                          text.empty() ? "" : "; ",
+                          std::isfinite(column.up_to) ?
+                              fmt::format("up to {:g}", column.up_to) :
+                              "above",
+                          column.state.nees_per_dof,
+                          100.0 * column.state.coverage95,
+                          column.state.count);
   return text;
 }
 
@@ -132,9 +133,12 @@ rowOf(const CaseName& name, PatchType type, const ConsistencyResult& result)
 std::vector<std::string>
 columnRemarks(const CaseName& name, const ConsistencyResult& result)
 {
-  const std::string what = name.scene + ", " + name.type + " (" + name.mode + ", " +
-                           name.options +
-                           "): state NEES/dof and share within 95 %, by ";
+  const std::string what =
+      fmt::format("{}, {} ({}, {}): state NEES/dof and share within 95 %, by ",
+                  name.scene,
+                  name.type,
+                  name.mode,
+                  name.options);
   std::vector<std::string> remarks{what + "nonlinearity " +
                                    columnsText(result.by_nonlinearity)};
   if (!result.by_curvature.empty())

@@ -11,6 +11,7 @@
 #include <holdfast/version.h>
 
 #include <CLI/CLI.hpp>
+#include <fmt/core.h>
 
 #include <filesystem>
 #include <iostream>
@@ -48,9 +49,10 @@ commandLine(const Experiment& experiment,
             const CLI::App& command,
             const ExperimentSettings& settings)
 {
-  std::string line = "holdfast experiment " + experiment.name + " --trials " +
-                     std::to_string(settings.trials) + " --seed " +
-                     std::to_string(settings.seed);
+  std::string line = fmt::format("holdfast experiment {} --trials {} --seed {}",
+                                 experiment.name,
+                                 settings.trials,
+                                 settings.seed);
   for (const CLI::Option* option : command.get_options()) {
     if (option->count() == 0 || option->get_group() == "Run")
       continue;

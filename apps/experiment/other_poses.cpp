@@ -1,10 +1,10 @@
 #include "other_poses.h"
 
-#include "console.h"
-
 #include <holdfast/pcl/conversions.h>
 #include <holdfast/sensor/names.h>
 #include <holdfast/sensor/pattern_calibration.h>
+
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>
@@ -134,9 +134,11 @@ usePatternsOfOtherPoses(std::vector<Recording>& recordings,
     patterns.push_back(patternWithout(pose, poses, recordings));
   for (std::size_t i = 0; i < recordings.size(); ++i) {
     recordings[i].sensor.pattern = patterns[static_cast<std::size_t>(poses[i])];
-    remarks.push_back(recordings[i].name + ": pose " + std::to_string(poses[i] + 1) +
-                      " of " + std::to_string(count) + ", pattern of the others " +
-                      patternText(recordings[i].sensor.pattern));
+    remarks.push_back(fmt::format("{}: pose {} of {}, pattern of the others {}",
+                                  recordings[i].name,
+                                  poses[i] + 1,
+                                  count,
+                                  patternText(recordings[i].sensor.pattern)));
   }
 }
 
@@ -145,9 +147,11 @@ patternText(const NoisePattern& pattern)
 {
   std::string text;
   for (const PatternWave& wave : pattern.waves)
-    text += (text.empty() ? "" : ", ") + formatNumber("%.3f px ", wave.sigma) +
-            std::string(kPatternShapeNames.of(wave.shape)) +
-            formatNumber(" over %.3g px", wave.length_px);
+    text += fmt::format("{}{:.3f} px {} over {:.3g} px",
+                        text.empty() ? "" : ", ",
+                        wave.sigma,
+                        kPatternShapeNames.of(wave.shape),
+                        wave.length_px);
   return text.empty() ? "none" : text;
 }
 

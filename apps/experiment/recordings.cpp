@@ -1,6 +1,5 @@
 #include "recordings.h"
 
-#include "console.h"
 #include "experiment.h"
 #include "input_options.h"
 
@@ -8,6 +7,7 @@
 #include <holdfast/pcl/intrinsics.h>
 
 #include <CLI/CLI.hpp>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -60,10 +60,12 @@ std::string
 planeRemark(const Recording& recording)
 {
   const RecordedPlane& plane = recording.plane;
-  return recording.name + ": plane of " + std::to_string(plane.pixels) +
-         " pixels, at " + formatNumber("%.2f", plane.mean_depth_m) +
-         " m; rms about it " + formatNumber("%.2f", plane.rms_sigmas) +
-         " sigmas of single points";
+  return fmt::format("{}: plane of {} pixels, at {:.2f} m; rms about it {:.2f} sigmas "
+                     "of single points",
+                     recording.name,
+                     plane.pixels,
+                     plane.mean_depth_m,
+                     plane.rms_sigmas);
 }
 
 /// Nothing where there is no plane, which a remark says then.
@@ -86,15 +88,16 @@ loadRecording(const std::string& path,
   recording.sensor = matchedSensor(sensorOf(info, nominal), recording.cloud, &notice);
   if (!notice.empty())
     notices.push_back(notice);
-  if (!recording.cloud.covariances.empty())
+  if (recording.cloud.hasCovariances())
     notices.emplace_back("its own covariances count, and no pattern");
   recording.cloud = withoutPatternMap(path, recording.cloud, recording.sensor, notices);
   for (const std::string& line : notices)
     remarks.push_back(recording.name + ": " + line);
   const auto plane = findLargestPlane(recording.cloud, recording.sensor, seed);
   if (!plane) {
-    remarks.push_back(recording.name + ": left out, no plane of " +
-                      std::to_string(kLeastPlanePixels) + " pixels");
+    remarks.push_back(fmt::format("{}: left out, no plane of {} pixels",
+                                  recording.name,
+                                  kLeastPlanePixels));
     return std::nullopt;
   }
   recording.plane = *plane;

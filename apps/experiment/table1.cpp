@@ -1,5 +1,4 @@
 // The paper's Table I: metrics of the covariance of ten patches, beside the truth.
-#include "console.h"
 #include "experiment.h"
 #include "scene.h"
 
@@ -10,6 +9,8 @@
 #include <holdfast/patch_estimator.h>
 #include <holdfast/simulation/reference_scenes.h>
 #include <holdfast/uncertainty/monte_carlo.h>
+
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <optional>
@@ -230,14 +231,17 @@ comparison(const std::vector<Json>& rows)
     truth_low = std::min(truth_low, truth_ratio);
     truth_high = std::max(truth_high, truth_ratio);
   }
-  const auto text = [](double value) { return formatNumber("%.2g", value); };
-  return "Squared covariance: (J^T J)^-2 in place of the covariance of the surface "
-         "parameters, as a solver that inverts twice would give it. The paper's Phi_k, "
-         "Phi_5, Phi_6 and Phi_t of the elliptic, hyperbolic and cylindric paraboloid "
-         "are " +
-         text(low) + " to " + text(high) +
-         " times this column, with which they are consistent; the truth is " +
-         text(truth_low) + " to " + text(truth_high) + " times the paper's.";
+  return fmt::format(
+      "Squared covariance: (J^T J)^-2 in place of the covariance of the surface "
+      "parameters, as a solver that inverts twice would give it. The paper's Phi_k, "
+      "Phi_5, Phi_6 and Phi_t of the elliptic, hyperbolic and cylindric paraboloid are "
+      "{:.2g} to {:.2g} times this column, with which they are consistent; the truth "
+      "is "
+      "{:.2g} to {:.2g} times the paper's.",
+      low,
+      high,
+      truth_low,
+      truth_high);
 }
 
 std::vector<Column>

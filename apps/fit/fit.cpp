@@ -10,6 +10,7 @@
 #include <holdfast/pcl/patch_extraction.h>
 
 #include <CLI/CLI.hpp>
+#include <fmt/core.h>
 
 #include <filesystem>
 #include <iostream>
@@ -80,8 +81,9 @@ private:
     const std::string stem = fs::path(report.cloud).stem().string();
     const auto [owner, is_new] = written_.emplace(stem, report.cloud);
     if (!is_new)
-      throw std::runtime_error(report.cloud + ": its results would replace those of " +
-                               owner->second);
+      throw std::runtime_error(fmt::format("{}: its results would replace those of {}",
+                                           report.cloud,
+                                           owner->second));
     writePatchFiles(report, settings_.output_folder, stem);
   }
 
@@ -98,10 +100,11 @@ checkCovariances(const PatchReport& report)
   const PointAccounting& points = report.result.points;
   if (points.invalid_covariance == 0)
     return true;
-  const std::string what = report.cloud + ": " +
-                           std::to_string(points.invalid_covariance) + " of " +
-                           std::to_string(points.valid()) +
-                           " covariances are not finite or not positive semi-definite";
+  const std::string what = fmt::format(
+      "{}: {} of {} covariances are not finite or not positive semi-definite",
+      report.cloud,
+      points.invalid_covariance,
+      points.valid());
   if (points.used == 0)
     throw std::runtime_error(what);
   printError(what + "; those points are left out");
@@ -114,8 +117,9 @@ checkPatches(const PatchReport& report)
   if (!report.result.patches.empty())
     return;
   const std::string rejected = rejectedText(report.result);
-  throw std::runtime_error(report.cloud +
-                           ": no patch: " + (rejected.empty() ? "no seed" : rejected));
+  throw std::runtime_error(fmt::format("{}: no patch: {}",
+                                       report.cloud,
+                                       rejected.empty() ? "no seed" : rejected));
 }
 
 void
@@ -178,7 +182,7 @@ fitCloud(const std::string& path,
   report.file = input.file;
   report.sensor_pose = input.cloud.sensor_pose;
   report.offset = input.cloud.offset;
-  report.covariances_of_cloud = !input.cloud.covariances.empty();
+  report.covariances_of_cloud = input.cloud.hasCovariances();
   report.load_ms = loading.milliseconds();
 
   const Stopwatch fitting;

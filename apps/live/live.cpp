@@ -15,6 +15,7 @@
 #include <holdfast/pcl/pattern_subtraction.h>
 
 #include <CLI/CLI.hpp>
+#include <fmt/core.h>
 
 #include <fstream>
 #include <iostream>
@@ -190,9 +191,9 @@ LiveSession::write(const RangeFrame& frame, PatchReport& report)
 std::string
 LiveSession::droppedText() const
 {
-  std::string text = std::to_string(grabber_.statistics().dropped) + " dropped";
+  std::string text = fmt::format("{} dropped", grabber_.statistics().dropped);
   if (const std::uint64_t lost = recording_ ? recording_->dropped() : 0; lost > 0)
-    text += ", " + std::to_string(lost) + " more not recorded";
+    text += fmt::format(", {} more not recorded", lost);
   return text;
 }
 
@@ -211,8 +212,10 @@ runLive(const CLI::App& command, LiveSettings& settings)
   RunCallbacks callbacks;
   callbacks.frame = [&session](const auto& frame) { session.process(frame); };
   callbacks.status = [&session] {
-    return session.statistics().pace() + ", " + session.statistics().work() + ", " +
-           session.droppedText();
+    return fmt::format("{}, {}, {}",
+                       session.statistics().pace(),
+                       session.statistics().work(),
+                       session.droppedText());
   };
   callbacks.idle = [&session] { return session.onIdle(); };
   const int exit_code = runGrabber(grabber, settings.run, callbacks);

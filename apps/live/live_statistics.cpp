@@ -1,13 +1,12 @@
 #include "live_statistics.h"
 
-#include "console.h"
-
 #include <unistd.h>
+
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <sstream>
 
 namespace holdfast::app {
 namespace {
@@ -97,15 +96,16 @@ LiveStatistics::pace() const
 {
   const std::lock_guard<std::mutex> lock(mutex_);
   const double rate = frames_ > 1 ? 1e3 / std::max(recent_period_ms_, 1e-3) : 0.0;
-  return std::to_string(frames_) + " frames, " + formatNumber("%.1f Hz", rate);
+  return fmt::format("{} frames, {:.1f} Hz", frames_, rate);
 }
 
 std::string
 LiveStatistics::work() const
 {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return formatNumber("latency %.1f ms, ", recent_latency_ms_) +
-         formatNumber("%.0f patches", recent_patches_);
+  return fmt::format("latency {:.1f} ms, {:.0f} patches",
+                     recent_latency_ms_,
+                     recent_patches_);
 }
 
 std::string
@@ -114,8 +114,7 @@ LiveStatistics::overallPace() const
   const std::lock_guard<std::mutex> lock(mutex_);
   const double seconds = 1e-3 * milliseconds(last_ - first_);
   const double rate = seconds > 0.0 ? static_cast<double>(frames_ - 1) / seconds : 0.0;
-  return std::to_string(frames_) + " frames in " + formatNumber("%.1f s, ", seconds) +
-         formatNumber("%.1f Hz", rate);
+  return fmt::format("{} frames in {:.1f} s, {:.1f} Hz", frames_, seconds, rate);
 }
 
 std::string
@@ -124,25 +123,24 @@ LiveStatistics::summary(const std::string& dropped) const
   const std::string pace = overallPace();
   const std::lock_guard<std::mutex> lock(mutex_);
   const auto latency = [this](double share) {
-    return formatNumber("%.1f ms",
-                        static_cast<double>(latency_.quantile(share)) / kStepsPerMs);
+    return static_cast<double>(latency_.quantile(share)) / kStepsPerMs;
   };
-  const auto patches = [this](double share) {
-    return std::to_string(patches_.quantile(share));
-  };
-  std::ostringstream out;
-  out << pace << ", " << dropped << '\n'
-      << "latency   median " << latency(0.5) << ", 99 % within " << latency(0.99)
-      << ", largest " << latency(1.0) << '\n'
-      << "patches   median " << patches(0.5) << " a frame, 99 % at least "
-      << patches(0.01) << ", most " << patches(1.0) << '\n'
-      << "points    median " << points_.quantile(0.5) << " a patch\n"
-      << "memory    " << formatNumber("%.1f MB", residentMegabytes());
+  std::string text = fmt::format("{}, {}\n", pace, dropped);
+  text +=
+      fmt::format("latency   median {:.1f} ms, 99 % within {:.1f} ms, largest {:.1f} "
+                  "ms\n",
+                  latency(0.5),
+                  latency(0.99),
+                  latency(1.0));
+  text += fmt::format("patches   median {} a frame, 99 % at least {}, most {}\n",
+                      patches_.quantile(0.5),
+                      patches_.quantile(0.01),
+                      patches_.quantile(1.0));
+  text += fmt::format("points    median {} a patch\n", points_.quantile(0.5));
+  text += fmt::format("memory    {:.1f} MB", residentMegabytes());
   if (frames_ >= kWarmUpFrames)
-    out << formatNumber(", %.1f MB after ", early_memory_mb_) << kWarmUpFrames
-        << " frames";
-  out << '\n';
-  return out.str();
+    text += fmt::format(", {:.1f} MB after {} frames", early_memory_mb_, kWarmUpFrames);
+  return text + "\n";
 }
 
 } // namespace holdfast::app

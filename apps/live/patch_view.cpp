@@ -1,8 +1,9 @@
 #include "patch_view.h"
 
-#include "console.h"
 #include "render/render_colors.h"
 #include "summary.h"
+
+#include <fmt/core.h>
 
 #include <cmath>
 #include <utility>
@@ -24,12 +25,16 @@ toShown(const ExtractedPatch& patch)
   shown.patch = fit.patch;
   shown.centre_covariance = fit.covariance.bottomRightCorner<3, 3>();
   shown.color = viridis(std::log(sigma_deg / kSurest) / std::log(kLeastSure / kSurest));
-  shown.caption =
-      spacedName(fit.patch.type.surface) + ", " + std::to_string(fit.points) +
-      " points, chi2/dof " + formatNumber("%.2f", chi2PerDof(fit)) + "\ncurvatures " +
-      formatNumber("%.2f", kappa.x()) + " and " + formatNumber("%.2f 1/m", kappa.y()) +
-      "\nsigma: normal " + formatNumber("%.2f deg", sigma_deg) + ", centre " +
-      formatNumber("%.2f mm", centreSigmaMillimetres(fit));
+  shown.caption = fmt::format("{}, {} points, chi2/dof {:.2f}\n"
+                              "curvatures {:.2f} and {:.2f} 1/m\n"
+                              "sigma: normal {:.2f} deg, centre {:.2f} mm",
+                              spacedName(fit.patch.type.surface),
+                              fit.points,
+                              chi2PerDof(fit),
+                              kappa.x(),
+                              kappa.y(),
+                              sigma_deg,
+                              centreSigmaMillimetres(fit));
   shown.seed = patch.seed_index.value_or(0);
   return shown;
 }
@@ -37,8 +42,10 @@ toShown(const ExtractedPatch& patch)
 } // namespace
 
 PatchView::PatchView()
-: window_(openViewer(formatNumber("dark: normal within %g deg, ", kSurest) +
-                     formatNumber("yellow: within %g deg", kLeastSure)))
+: window_(
+      openViewer(fmt::format("dark: normal within {:g} deg, yellow: within {:g} deg",
+                             kSurest,
+                             kLeastSure)))
 {}
 
 void

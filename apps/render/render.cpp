@@ -15,6 +15,7 @@
 #include <pcl/common/point_tests.h>
 
 #include <CLI/CLI.hpp>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -166,9 +167,10 @@ loadSubject(const std::string& result, const RenderSettings& settings)
   if (settings.max_patches)
     subject.patches =
         evenShare(subject.patches, static_cast<std::size_t>(*settings.max_patches));
-  subject.title = fs::path(path).filename().string() + ", " +
-                  std::to_string(subject.patches.size()) +
-                  (subject.patches.size() == 1 ? " patch" : " patches");
+  subject.title = fmt::format("{}, {} {}",
+                              fs::path(path).filename().string(),
+                              subject.patches.size(),
+                              subject.patches.size() == 1 ? "patch" : "patches");
   subject.points = picturePoints(cloud, info.colors);
   subject.sensor_pose = cloud.sensor_pose;
   subject.seen = isSeenFrom(cloud.sensor_pose, subject.points.positions);

@@ -436,7 +436,7 @@ finish(io::RawCloud& raw, const LoadOptions& options)
   invalid_zeros +=
       invalidatedZeros(survey.zeros - invalid_zeros, cloud.sensor_pose, points);
   requirePoints(survey.finite - invalid_zeros);
-  cloud.covariances = std::move(raw.covariances);
+  cloud.covariances = std::make_shared<const Covariances>(std::move(raw.covariances));
   points.is_dense = survey.finite - invalid_zeros == points.size();
   info.zero_points += static_cast<int>(invalid_zeros);
   noteZeroPoints(info);
@@ -475,7 +475,7 @@ isWide(const RangeCloud& cloud)
 std::string
 pcdHeader(const RangeCloud& cloud, bool ascii)
 {
-  const bool has_covariances = !cloud.covariances.empty();
+  const bool has_covariances = cloud.hasCovariances();
   const Eigen::Vector3d c = cloud.sensor_pose.c + cloud.offset;
   const Eigen::Quaterniond q(cloud.sensor_pose.R);
   const int size = isWide(cloud) ? 8 : 4;
@@ -528,8 +528,8 @@ pcdRow(const RangeCloud& cloud, std::size_t i, bool ascii)
     else
       append(p.data[k], ascii, row);
   }
-  if (!cloud.covariances.empty()) {
-    const Eigen::Matrix3f& s = cloud.covariances[i];
+  if (cloud.hasCovariances()) {
+    const Eigen::Matrix3f& s = (*cloud.covariances)[i];
     for (int r = 0; r < 3; ++r)
       for (int c = r; c < 3; ++c)
         append(s(r, c), ascii, row);
@@ -625,10 +625,12 @@ countValidPoints(const RangeCloud& cloud)
 int
 countInvalidCovariances(const RangeCloud& cloud)
 {
+  if (!cloud.hasCovariances())
+    return 0;
   int invalid = 0;
-  for (std::size_t i = 0; i < cloud.covariances.size(); ++i)
+  for (std::size_t i = 0; i < cloud.points->size(); ++i)
     invalid += pcl::isFinite((*cloud.points)[i]) &&
-               !isPositiveSemiDefinite(cloud.covariances[i].cast<double>());
+               !isPositiveSemiDefinite((*cloud.covariances)[i].cast<double>());
   return invalid;
 }
 

@@ -3,6 +3,8 @@
 #include "openni2_frames.h"
 #include "openni2_runtime.h"
 
+#include <fmt/core.h>
+
 #include <fstream>
 
 namespace holdfast::io {
@@ -12,9 +14,10 @@ namespace {
 std::string
 describe(const openni::VideoMode& mode)
 {
-  return std::to_string(mode.getResolutionX()) + " x " +
-         std::to_string(mode.getResolutionY()) + " at " +
-         std::to_string(mode.getFps()) + " Hz";
+  return fmt::format("{} x {} at {} Hz",
+                     mode.getResolutionX(),
+                     mode.getResolutionY(),
+                     mode.getFps());
 }
 
 bool
@@ -41,8 +44,9 @@ chooseDepthMode(const openni::SensorInfo& sensor, const Openni2Options& options)
   openni::VideoMode wanted;
   wanted.setResolution(options.width, options.height);
   wanted.setFps(options.frames_per_second);
-  throw Openni2Error("the camera has no depth images of " + describe(wanted) +
-                     ", but " + available);
+  throw Openni2Error(fmt::format("the camera has no depth images of {}, but {}",
+                                 describe(wanted),
+                                 available));
 }
 
 /// Turns mirroring off; true if the stream does it all the same.

@@ -2,6 +2,8 @@
 
 #include "openni2_runtime.h"
 
+#include <fmt/core.h>
+
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -71,8 +73,8 @@ chooseCamera(const std::optional<Camera>& given,
              double vertical_fov)
 {
   if (given && (given->width != width || given->height != height))
-    throw Openni2Error("the given camera is not one of " + std::to_string(width) +
-                       " x " + std::to_string(height) + " pixels");
+    throw Openni2Error(
+        fmt::format("the given camera is not one of {} x {} pixels", width, height));
   if (given)
     return *given;
   const auto is_plausible = [](double fov) { return fov > 0.01 && fov < M_PI - 0.01; };

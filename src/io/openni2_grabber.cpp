@@ -47,7 +47,7 @@ check(const Openni2Options& options)
     throw std::invalid_argument("stall_periods must be at least 1");
 }
 
-std::vector<Eigen::Matrix3f>
+Covariances
 covariancesOf(const pcl::PointCloud<pcl::PointXYZ>& cloud, const NoiseModel& noise)
 {
   std::vector<Eigen::Vector3d> image;
@@ -393,7 +393,8 @@ Openni2Grabber::Impl::deliver(const io::Image& depth)
   if (pairer_.color().pixels && (wants_frames || !on_colored->empty()))
     frame->colored = io::colorCloud(*points, pairer_.color());
   if (wants_frames && options_.noise)
-    frame->cloud.covariances = covariancesOf(*points, *options_.noise);
+    frame->cloud.covariances =
+        std::make_shared<const Covariances>(covariancesOf(*points, *options_.noise));
   call(on_points, frame->cloud.points);
   if (frame->colored)
     call(on_colored, frame->colored);

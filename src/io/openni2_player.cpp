@@ -3,6 +3,8 @@
 #include "openni2_frames.h"
 #include "openni2_runtime.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <thread>
 #include <utility>
@@ -121,8 +123,8 @@ OniPlayer::decode(const OniFrame& frame)
                                     share(decodeColor(stream, data));
   }
   catch (const Openni2Error& error) {
-    throw Openni2Error(info_.device.uri + ", image " + std::to_string(frame.number) +
-                       ": " + error.what());
+    throw Openni2Error(
+        fmt::format("{}, image {}: {}", info_.device.uri, frame.number, error.what()));
   }
   image.is_depth = frame.is_depth;
   image.is_mirrored = stream.is_mirrored;

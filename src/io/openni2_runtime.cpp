@@ -3,6 +3,7 @@
 #include <holdfast/io/openni2_grabber.h>
 
 #include <OpenNI.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <condition_variable>
@@ -125,8 +126,8 @@ resolveDevice(const std::string& device)
   const unsigned long number =
       is_number ? std::strtoul(digits.c_str(), nullptr, 10) : 1;
   if (number < 1 || number > devices.size())
-    throw Openni2Error("there is no camera #" + digits + ": OpenNI2 sees " +
-                       std::to_string(devices.size()));
+    throw Openni2Error(
+        fmt::format("there is no camera #{}: OpenNI2 sees {}", digits, devices.size()));
   return devices[number - 1].uri;
 }
 

@@ -642,9 +642,10 @@ requireKnownSchema(const Json& json)
     return;
   const int schema = wholeNumber(json, "schema");
   if (schema < 1 || schema > kSchema)
-    throw std::runtime_error("written by another version of holdfast: schema " +
-                             std::to_string(schema) + ", this one reads up to " +
-                             std::to_string(kSchema));
+    throw std::runtime_error(fmt::format("written by another version of holdfast: "
+                                         "schema {}, this one reads up to {}",
+                                         schema,
+                                         kSchema));
 }
 
 /// All meshes as one.

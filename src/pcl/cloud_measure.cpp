@@ -2,9 +2,10 @@
 
 #include <pcl/common/point_tests.h>
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <vector>
 
 namespace holdfast {
@@ -127,25 +128,25 @@ measureCloud(const Cloud& cloud, const Eigen::Vector3d& sensor_position)
 std::string
 shortNumber(double value)
 {
-  char text[32];
-  // %g would write 1520 as 1.52e+03.
+  // Three digits would be 1.52e+03.
   const bool long_digits = std::abs(value) >= 1e3 && std::abs(value) < 1e7;
-  std::snprintf(text, sizeof text, long_digits ? "%.0f" : "%.3g", value);
-  return text;
+  return long_digits ? fmt::format("{:.0f}", value) : fmt::format("{:.3g}", value);
 }
 
 std::string
 describe(const CloudMeasure& measure)
 {
-  std::string text = std::to_string(measure.valid) + " of " +
-                     std::to_string(measure.points) + " points are valid";
+  std::string text =
+      fmt::format("{} of {} points are valid", measure.valid, measure.points);
   if (measure.valid == 0)
     return text;
   const Eigen::Vector3d size = measure.high - measure.low;
-  text += ", over " + shortNumber(size.x()) + " x " + shortNumber(size.y()) + " x " +
-          shortNumber(size.z()) + " m";
+  text += fmt::format(", over {} x {} x {} m",
+                      shortNumber(size.x()),
+                      shortNumber(size.y()),
+                      shortNumber(size.z()));
   if (std::isfinite(measure.spacing_m))
-    text += ", " + shortNumber(measure.spacing_m) + " m apart";
+    text += fmt::format(", {} m apart", shortNumber(measure.spacing_m));
   return text;
 }
 

@@ -7,6 +7,8 @@
 
 #include <holdfast/geometry/constants.h>
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -180,9 +182,9 @@ noteZeroPoints(int count, std::string* notice)
     return;
   if (!notice->empty())
     *notice += "; ";
-  *notice += std::to_string(count) +
-             (count == 1 ? " point at the sensor is" : " points at the sensor are") +
-             " taken as invalid";
+  *notice += fmt::format("{} at the sensor {} taken as invalid",
+                         count == 1 ? "1 point" : fmt::format("{} points", count),
+                         count == 1 ? "is" : "are");
 }
 
 } // namespace detail
@@ -206,8 +208,9 @@ toPointCloud(const RangeCloud& cloud)
 {
   pcl::PointCloud<PointXYZCovariance> points;
   pcl::copyPointCloud(*cloud.points, points);
-  for (std::size_t i = 0; i < cloud.covariances.size(); ++i)
-    points[i].setCovariance(cloud.covariances[i]);
+  if (cloud.hasCovariances())
+    for (std::size_t i = 0; i < points.size(); ++i)
+      points[i].setCovariance((*cloud.covariances)[i]);
   writeSensorPose(cloud.sensor_pose, points);
   return points;
 }

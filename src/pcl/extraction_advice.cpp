@@ -2,6 +2,8 @@
 
 #include "cloud_measure.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -52,14 +54,14 @@ radiusAdvice(const CloudMeasure& measure, double radius_m)
 {
   const std::string unit = likelyUnit(measure);
   if (!unit.empty())
-    return "are the coordinates not metres? --unit " + unit + " scales them";
+    return fmt::format("are the coordinates not metres? --unit {} scales them", unit);
   if (radius_m >= measure.extent())
-    return "the radius of " + meters(radius_m) + " is larger than the cloud";
+    return fmt::format("the radius of {} is larger than the cloud", meters(radius_m));
   // A disc of two spacings holds a dozen points.
   if (!(radius_m >= 2.0 * measure.spacing_m))
-    return "the radius of " + meters(radius_m) +
-           " is too small for points so far apart, or the unit is not the metre "
-           "(--unit)";
+    return fmt::format("the radius of {} is too small for points so far apart, or the "
+                       "unit is not the metre (--unit)",
+                       meters(radius_m));
   return {};
 }
 
@@ -71,6 +73,13 @@ probesAmong(const std::vector<Seed>& seeds)
   for (std::size_t i = 0; i < kProbes; ++i)
     probes.push_back(seeds[i * seeds.size() / kProbes]);
   return probes;
+}
+
+/// The cloud, and what is wrong where something is.
+std::string
+described(const CloudMeasure& measure, const std::string& advice)
+{
+  return describe(measure) + (advice.empty() ? "" : ": " + advice);
 }
 
 CloudMeasure
@@ -102,13 +111,14 @@ std::string
 viewpointNotice(const RangeCloud& cloud)
 {
   const Eigen::Vector3d& c = cloud.sensor_pose.c;
-  return "it is not known where the cloud was taken from, and the points do not look "
-         "as "
-         "if it were " +
-         shortNumber(c.x()) + " " + shortNumber(c.y()) + " " + shortNumber(c.z()) +
-         ": normals may be on the wrong side (bumps come out as bowls); --viewpoint X "
-         "Y "
-         "Z or --orient outward|up tells the side";
+  return fmt::format(
+      "it is not known where the cloud was taken from, and the points do "
+      "not look as if it were {} {} {}: normals may be on the wrong side "
+      "(bumps come out as bowls); --viewpoint X Y Z or --orient "
+      "outward|up tells the side",
+      shortNumber(c.x()),
+      shortNumber(c.y()),
+      shortNumber(c.z()));
 }
 
 void
@@ -130,23 +140,22 @@ keepPromisingSeeds(const PointSelection& chosen,
     with_neighbors += indices.size() >= kFewestPoints;
     with_all += indices.size() == whole;
   }
-  const std::string others =
-      "the other " + std::to_string(seeds.size() - probes.size()) + " are not tried: ";
   if (with_neighbors <= 1) {
     const CloudMeasure measure = measured(chosen);
-    const std::string advice = radiusAdvice(measure, sampler.radius_m);
-    notices.push_back(std::to_string(with_neighbors) + " of " +
-                      std::to_string(probes.size()) + " seeds have neighbours, " +
-                      others + describe(measure) +
-                      (advice.empty() ? "" : ": " + advice));
+    notices.push_back(
+        fmt::format("{} of {} seeds have neighbours, the other {} are not tried: {}",
+                    with_neighbors,
+                    probes.size(),
+                    seeds.size() - probes.size(),
+                    described(measure, radiusAdvice(measure, sampler.radius_m))));
     seeds = probes;
   }
   else if (with_all == probes.size()) {
     notices.push_back(
-        "each neighbourhood is the whole cloud, so only one seed is tried: "
-        "the radius of " +
-        meters(sampler.radius_m) + " is larger than the cloud, " +
-        describe(measured(chosen)));
+        fmt::format("each neighbourhood is the whole cloud, so only one seed is tried: "
+                    "the radius of {} is larger than the cloud, {}",
+                    meters(sampler.radius_m),
+                    describe(measured(chosen))));
     seeds = {probes[probes.size() / 2]};
   }
 }
@@ -159,17 +168,17 @@ adviseOnNoPatches(const PointSelection& chosen,
   if (std::any_of(result.patches.begin(), result.patches.end(), isAccepted))
     return;
   if (chosen.points.used == 0) {
-    result.notices.push_back("no patch, since no point can be used: " +
-                             std::to_string(chosen.points.invalid) + " of " +
-                             std::to_string(chosen.points.in_cloud) + " are invalid");
+    result.notices.push_back(
+        fmt::format("no patch, since no point can be used: {} of {} are invalid",
+                    chosen.points.invalid,
+                    chosen.points.in_cloud));
     return;
   }
   const CloudMeasure measure = measured(chosen);
   const std::string advice = sampler.neighborhood == Neighborhood::Knn ?
                                  std::string() :
                                  radiusAdvice(measure, sampler.radius_m);
-  result.notices.push_back("no patch: " + describe(measure) +
-                           (advice.empty() ? "" : ": " + advice));
+  result.notices.push_back("no patch: " + described(measure, advice));
 }
 
 } // namespace holdfast

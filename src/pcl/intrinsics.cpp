@@ -2,9 +2,10 @@
 
 #include <pcl/common/point_tests.h>
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 namespace holdfast {
 
@@ -134,20 +135,17 @@ isTakenFrom(const RangeCloud& cloud)
 std::string
 describeChange(const Camera& from, const Camera& to)
 {
-  char text[256];
-  std::snprintf(text,
-                sizeof text,
-                "intrinsics recovered from the cloud: fx %.1f fy %.1f cx %.1f cy %.1f, "
-                "where the sensor has %.1f %.1f %.1f %.1f",
-                to.fx,
-                to.fy,
-                to.cx,
-                to.cy,
-                from.fx,
-                from.fy,
-                from.cx,
-                from.cy);
-  return text;
+  return fmt::format("intrinsics recovered from the cloud: fx {:.1f} fy {:.1f} cx "
+                     "{:.1f} cy {:.1f}, where the sensor has {:.1f} {:.1f} {:.1f} "
+                     "{:.1f}",
+                     to.fx,
+                     to.fy,
+                     to.cx,
+                     to.cy,
+                     from.fx,
+                     from.fy,
+                     from.cx,
+                     from.cy);
 }
 
 } // namespace

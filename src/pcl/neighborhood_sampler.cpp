@@ -188,12 +188,12 @@ double
 NeighborhoodSampler::Impl::depthSigma(int seed) const
 {
   double variance = 0.0;
-  if (cloud.covariances.empty())
+  if (!cloud.hasCovariances())
     variance = noise->covariance(inCamera(seed))(2, 2);
   else {
     const Eigen::Vector3d axis = cloud.sensor_pose.R.col(2);
     const Eigen::Matrix3d S =
-        cloud.covariances[static_cast<std::size_t>(seed)].cast<double>();
+        (*cloud.covariances)[static_cast<std::size_t>(seed)].cast<double>();
     variance = axis.dot(S * axis);
   }
   // A covariance that is none (negative, NaN) is no reason to cut.

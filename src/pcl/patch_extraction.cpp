@@ -11,6 +11,8 @@
 
 #include <pcl/common/point_tests.h>
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <atomic>
 #include <memory>
@@ -365,8 +367,9 @@ choose(const ExtractionOptions& options,
   if (options.max_overlap < 1.0) {
     const int left_out = thinOut(options.max_overlap, supports, points, attempts);
     if (left_out > 0)
-      notices.push_back(std::to_string(left_out) +
-                        " patches are left out, since better ones have their points");
+      notices.push_back(
+          fmt::format("{} patches are left out, since better ones have their points",
+                      left_out));
   }
   if (!takesBest(options.sampler, asked))
     return;
@@ -375,9 +378,9 @@ choose(const ExtractionOptions& options,
                                 sampler.spacing_m,
                                 attempts);
   if (left_out > 0)
-    notices.push_back("the best " + std::to_string(sampler.max_patches) + " of " +
-                      std::to_string(sampler.max_patches + left_out) +
-                      " patches are given");
+    notices.push_back(fmt::format("the best {} of {} patches are given",
+                                  sampler.max_patches,
+                                  sampler.max_patches + left_out));
 }
 
 /// Attempts into patches and reasons.
@@ -421,9 +424,10 @@ void
 noteLimit(std::size_t tried, std::size_t seeds, std::vector<std::string>& notices)
 {
   if (tried < seeds)
-    notices.push_back("stopped at the limit of patches, area or time after " +
-                      std::to_string(tried) + " of " + std::to_string(seeds) +
-                      " seeds");
+    notices.push_back(fmt::format("stopped at the limit of patches, area or time after "
+                                  "{} of {} seeds",
+                                  tried,
+                                  seeds));
 }
 
 } // namespace

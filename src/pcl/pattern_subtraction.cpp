@@ -4,6 +4,8 @@
 
 #include <pcl/common/point_tests.h>
 
+#include <fmt/core.h>
+
 #include <cmath>
 #include <cstddef>
 #include <optional>
@@ -20,16 +22,10 @@ focalTimesBaseline(const Sensor& sensor)
 {
   const auto* stereo = dynamic_cast<const StereoNoiseModel*>(sensor.noise.get());
   if (stereo == nullptr)
-    throw std::runtime_error("the sensor " + sensor.name +
-                             " has a pattern map, but no disparities: its noise model "
-                             "is not stereo");
+    throw std::runtime_error(fmt::format("the sensor {} has a pattern map, but no "
+                                         "disparities: its noise model is not stereo",
+                                         sensor.name));
   return stereo->parameters().focal_px * stereo->parameters().baseline_m;
-}
-
-std::string
-sizeText(int width, int height)
-{
-  return std::to_string(width) + " x " + std::to_string(height);
 }
 
 /// Of the map, row by row; nothing outside.
@@ -60,7 +56,7 @@ subtractPatternMap(const RangeCloud& cloud, const Sensor& sensor, std::string* n
       *notice = why + ": the sensor's pattern map is not subtracted";
     return cloud;
   };
-  if (!cloud.covariances.empty())
+  if (cloud.hasCovariances())
     return leave("the cloud has covariances of its own");
   const bool organized = cloud.points->height > 1;
   const std::string error = patternMapError(sensor,
@@ -100,10 +96,13 @@ patternMapError(const Sensor& sensor, int width, int height)
   if (!sensor.pattern_map ||
       (sensor.pattern_map->width() == width && sensor.pattern_map->height() == height))
     return "";
-  return sizeText(width, height) + " pixels, where the pattern map of the sensor " +
-         sensor.name + " has " +
-         sizeText(sensor.pattern_map->width(), sensor.pattern_map->height()) +
-         ": take its own images, or --no-pattern";
+  return fmt::format("{} x {} pixels, where the pattern map of the sensor {} has {} x "
+                     "{}: take its own images, or --no-pattern",
+                     width,
+                     height,
+                     sensor.name,
+                     sensor.pattern_map->width(),
+                     sensor.pattern_map->height());
 }
 
 } // namespace holdfast

@@ -22,7 +22,7 @@ std::vector<Eigen::Matrix3f>
 imageCovariances(const RangeCloud& cloud, const NoiseModel& noise)
 {
   const bool organized = cloud.points->height > 1;
-  if (!cloud.covariances.empty() || !organized || !noise.dependsOnNeighbors())
+  if (cloud.hasCovariances() || !organized || !noise.dependsOnNeighbors())
     return {};
   std::vector<Eigen::Vector3d> image;
   image.reserve(cloud.points->size());
@@ -88,7 +88,7 @@ PointGatherer::PointGatherer(const RangeCloud& cloud,
 , to_camera_(cloud.sensor_pose.inverse())
 , in_camera_frame_(isIdentity(cloud.sensor_pose))
 , image_covariances_(imageCovariances(cloud, *noise_))
-, stored_(cloud.covariances.empty() ? image_covariances_ : cloud.covariances)
+, stored_(cloud.hasCovariances() ? *cloud.covariances : image_covariances_)
 {}
 
 PointGatherer::PointGatherer(const RangeCloud& cloud,
@@ -97,7 +97,7 @@ PointGatherer::PointGatherer(const RangeCloud& cloud,
 : PointGatherer(cloud, sensor.noise, noise_at_surface)
 {
   camera_ = sensor.camera;
-  if (!sensor.pattern.empty() && cloud.covariances.empty())
+  if (!sensor.pattern.empty() && !cloud.hasCovariances())
     pattern_ = std::make_shared<const CorrelatedNoise>(sensor.pattern);
 }
 

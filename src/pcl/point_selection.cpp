@@ -9,6 +9,8 @@
 
 #include <pcl/common/point_tests.h>
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <limits>
 #include <memory>
@@ -27,7 +29,7 @@ requireUsable(const RangeCloud& cloud, const Sensor& sensor)
 {
   if (const std::string error = validityError(cloud); !error.empty())
     throw std::invalid_argument(error);
-  if (!sensor.noise && cloud.covariances.empty())
+  if (!sensor.noise && !cloud.hasCovariances())
     throw std::invalid_argument(
         "the cloud has no covariances, and the sensor no noise model");
 }
@@ -48,8 +50,11 @@ isCovariance(const Eigen::Matrix3d& S)
 void
 dropInvalidCovariances(const RangeCloud& cloud, UnusedPoints& unused)
 {
-  for (std::size_t i = 0; i < cloud.covariances.size(); ++i)
-    if (!isCovariance(cloud.covariances[i].cast<double>()))
+  if (!cloud.hasCovariances())
+    return;
+  const Covariances& covariances = *cloud.covariances;
+  for (std::size_t i = 0; i < covariances.size(); ++i)
+    if (!isCovariance(covariances[i].cast<double>()))
       unused.drop(i, &PointAccounting::invalid_covariance);
 }
 
@@ -71,10 +76,11 @@ noteDuplicates(PointSelection& selection)
   if (points.duplicate == 0)
     return;
   const int distinct = points.used + points.duplicate;
-  selection.notices.push_back(
-      std::to_string(points.duplicate) + " of " + std::to_string(distinct) +
-      " points (" + std::to_string(100LL * points.duplicate / distinct) +
-      " %) lie exactly where others do: each place counts once");
+  selection.notices.push_back(fmt::format(
+      "{} of {} points ({} %) lie exactly where others do: each place counts once",
+      points.duplicate,
+      distinct,
+      100LL * points.duplicate / distinct));
 }
 
 /// Duplicates have a notice of their own.
@@ -98,7 +104,7 @@ selectPoints(const RangeCloud& cloud, const Sensor& nominal)
   selection.sensor =
       nominal.noise ? nominal : withConstantNoise(nominal, kUnknownSigma);
   const bool model_asked =
-      cloud.covariances.empty() && nominal.noise && !nominal.noise->isOmnidirectional();
+      !cloud.hasCovariances() && nominal.noise && !nominal.noise->isOmnidirectional();
   const ViewCheck view(cloud, selection.sensor);
   UnusedPoints unused(cloud);
   if (model_asked && view.isForeign()) {
@@ -132,14 +138,16 @@ leftOutText(const PointAccounting& points)
   std::string reasons;
   const auto add = [&reasons](int count, const char* reason) {
     if (count > 0)
-      reasons += (reasons.empty() ? "" : ", ") + std::to_string(count) + " " + reason;
+      reasons += fmt::format("{}{} {}", reasons.empty() ? "" : ", ", count, reason);
   };
   add(points.behind_camera, "behind the camera");
   add(points.out_of_view, "out of the sensor's view or range");
   add(points.invalid_covariance, "with a covariance that is none");
   add(points.duplicate, "duplicates");
-  return std::to_string(left_out) + " of " + std::to_string(points.valid()) +
-         " points are left out: " + reasons;
+  return fmt::format("{} of {} points are left out: {}",
+                     left_out,
+                     points.valid(),
+                     reasons);
 }
 
 } // namespace holdfast

@@ -1,5 +1,7 @@
 #include "sac_doubts.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -41,14 +43,17 @@ doubtSigmas(const ConsensusFacts& facts)
   const double threshold = facts.limits.threshold;
   const std::string given = "a threshold of " + thresholdText(facts);
   if (threshold < kFewestSigmas)
-    return given + " keeps " +
-           shortNumber(100.0 * std::erf(threshold / std::sqrt(2.0))) +
-           " % of the points of a surface: 2 to 5 sigmas are expected; is it in metres "
-           "(setDistanceThreshold(), ConsensusDistance::Euclidean)?";
+    return fmt::format("{} keeps {} % of the points of a surface: 2 to 5 sigmas are "
+                       "expected; is it in metres (setDistanceThreshold(), "
+                       "ConsensusDistance::Euclidean)?",
+                       given,
+                       shortNumber(100.0 * std::erf(threshold / std::sqrt(2.0))));
   if (threshold > kMostSigmas)
-    return given +
-           (facts.noise_m > 0.0 ? " is " + metres(threshold * facts.noise_m) : "") +
-           ": 2 to 5 sigmas are expected; is it in millimetres?";
+    return fmt::format("{}{}: 2 to 5 sigmas are expected; is it in millimetres?",
+                       given,
+                       facts.noise_m > 0.0 ?
+                           " is " + metres(threshold * facts.noise_m) :
+                           std::string());
   return {};
 }
 
@@ -59,13 +64,17 @@ doubtBesideNoise(const ConsensusFacts& facts)
   const double threshold = facts.limits.threshold;
   const std::string given = "a threshold of " + thresholdText(facts);
   if (threshold < facts.noise_m)
-    return given + " is below the noise of the points, " + metres(facts.noise_m) +
-           ": it misses most points of a surface; 2 to 5 times the noise are expected, "
-           "or sigmas (setSigmaThreshold(), ConsensusDistance::Mahalanobis)";
+    return fmt::format("{} is below the noise of the points, {}: it misses most points "
+                       "of a surface; 2 to 5 times the noise are expected, or sigmas "
+                       "(setSigmaThreshold(), ConsensusDistance::Mahalanobis)",
+                       given,
+                       metres(facts.noise_m));
   if (facts.noise_m > 0.0 && threshold > kMostNoises * facts.noise_m)
-    return given + " is " + shortNumber(threshold / facts.noise_m) +
-           " times the noise of the points: 2 to 5 times are expected; is it in sigmas "
-           "(setSigmaThreshold(), ConsensusDistance::Mahalanobis)?";
+    return fmt::format("{} is {} times the noise of the points: 2 to 5 times are "
+                       "expected; is it in sigmas (setSigmaThreshold(), "
+                       "ConsensusDistance::Mahalanobis)?",
+                       given,
+                       shortNumber(threshold / facts.noise_m));
   return {};
 }
 
@@ -74,15 +83,15 @@ doubtWithoutNoise(const ConsensusFacts& facts)
 {
   const double threshold = facts.limits.threshold;
   if (facts.for_want_of_noise && threshold >= kLeastMetresThatAreSigmas)
-    return "a threshold of " + shortNumber(threshold) +
-           " is read as metres, because nothing is known of the noise: for sigmas, "
-           "give "
-           "a sensor, a noise model or covariances";
+    return fmt::format("a threshold of {} is read as metres, because nothing is known "
+                       "of the noise: for sigmas, give a sensor, a noise model or "
+                       "covariances",
+                       shortNumber(threshold));
   if (threshold < kLeastOfSpacing * facts.cloud.spacing_m)
-    return "a threshold of " + metres(threshold) +
-           " is far below the distance between points, " +
-           metres(facts.cloud.spacing_m) +
-           ": metres are expected; is the cloud in millimetres?";
+    return fmt::format("a threshold of {} is far below the distance between points, "
+                       "{}: metres are expected; is the cloud in millimetres?",
+                       metres(threshold),
+                       metres(facts.cloud.spacing_m));
   return {};
 }
 
@@ -94,10 +103,12 @@ doubtMetres(const ConsensusFacts& facts)
   std::string doubt =
       facts.noise_known ? doubtBesideNoise(facts) : doubtWithoutNoise(facts);
   if (doubt.empty() && extent > 0.0 && threshold > kMostOfExtent * extent)
-    doubt = "a threshold of " + metres(threshold) +
-            " is more than a quarter of the cloud's extent, " + metres(extent) +
-            ": metres are expected; is it in sigmas (setSigmaThreshold(), "
-            "ConsensusDistance::Mahalanobis) or in millimetres?";
+    doubt = fmt::format("a threshold of {} is more than a quarter of the cloud's "
+                        "extent, {}: metres are expected; is it in sigmas "
+                        "(setSigmaThreshold(), ConsensusDistance::Mahalanobis) or in "
+                        "millimetres?",
+                        metres(threshold),
+                        metres(extent));
   return doubt;
 }
 
@@ -114,8 +125,9 @@ radiiText(const ConsensusLimits& limits)
 {
   const ConsensusLimits all;
   const bool no_most = limits.radius_max_m == all.radius_max_m;
-  return shortNumber(std::max(limits.radius_min_m, 0.0)) + " m to " +
-         (no_most ? "any" : metres(limits.radius_max_m));
+  return fmt::format("{} to {}",
+                     metres(std::max(limits.radius_min_m, 0.0)),
+                     no_most ? "any" : metres(limits.radius_max_m));
 }
 
 std::string
@@ -127,13 +139,15 @@ doubtRadii(const ConsensusFacts& facts)
   if (!(limits.radius_min_m <= limits.radius_max_m && limits.radius_max_m > 0.0))
     return "radius limits of " + radiiText(limits) + " leave no radius";
   if (limits.radius_max_m < facts.cloud.spacing_m)
-    return "the largest radius, " + metres(limits.radius_max_m) +
-           ", is below the distance between points, " + metres(facts.cloud.spacing_m) +
-           ": metres are expected; is the cloud in millimetres?";
+    return fmt::format("the largest radius, {}, is below the distance between points, "
+                       "{}: metres are expected; is the cloud in millimetres?",
+                       metres(limits.radius_max_m),
+                       metres(facts.cloud.spacing_m));
   if (limits.radius_min_m > facts.cloud.extent())
-    return "the least radius, " + metres(limits.radius_min_m) +
-           ", is larger than the cloud, " + metres(facts.cloud.extent()) +
-           ": metres are expected; is it in millimetres?";
+    return fmt::format("the least radius, {}, is larger than the cloud, {}: metres are "
+                       "expected; is it in millimetres?",
+                       metres(limits.radius_min_m),
+                       metres(facts.cloud.extent()));
   return {};
 }
 
@@ -143,9 +157,10 @@ doubtUnit(const ConsensusFacts& facts)
   const CloudMeasure& cloud = facts.cloud;
   if (cloud.organized && cloud.extent() > kWidestImage &&
       cloud.range_m > kFarthestImage)
-    return "the image is " + metres(cloud.extent()) + " wide and " +
-           metres(cloud.range_m) +
-           " away: metres are expected; is the cloud in millimetres?";
+    return fmt::format("the image is {} wide and {} away: metres are expected; is the "
+                       "cloud in millimetres?",
+                       metres(cloud.extent()),
+                       metres(cloud.range_m));
   return {};
 }
 
@@ -159,10 +174,11 @@ doubtNoise(const ConsensusFacts& facts)
            "(setSensorPose()), are the covariances positive?";
   const double extent = facts.cloud.extent();
   if (extent > 0.0 && facts.noise_m > kMostOfExtent * extent)
-    return "the noise of the points, " + metres(facts.noise_m) +
-           ", is as large as the cloud, " + metres(extent) +
-           ": metres are expected; is the cloud in millimetres, is it the right "
-           "sensor?";
+    return fmt::format("the noise of the points, {}, is as large as the cloud, {}: "
+                       "metres are expected; is the cloud in millimetres, is it the "
+                       "right sensor?",
+                       metres(facts.noise_m),
+                       metres(extent));
   return {};
 }
 
@@ -172,7 +188,7 @@ Doubts
 doubtsAbout(const ConsensusFacts& facts)
 {
   if (facts.cloud.valid == 0)
-    return {"none of the " + std::to_string(facts.cloud.points) + " points is finite"};
+    return {fmt::format("none of the {} points is finite", facts.cloud.points)};
   // The more likely cause first.
   Doubts doubts{doubtUnit(facts),
                 doubtNoise(facts),

@@ -9,6 +9,7 @@
 #include <pcl/common/point_tests.h>
 
 #include <Eigen/Eigenvalues>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>
@@ -124,7 +125,7 @@ PatchConsensus::Impl::prepare()
   distance_gatherer.reset();
   fit_gatherer.reset();
   input_error = validityError(cloud);
-  if (!input_error.empty() || (!sensor.noise && cloud.covariances.empty()))
+  if (!input_error.empty() || (!sensor.noise && !cloud.hasCovariances()))
     return;
   // The model is not asked where there are covariances, but has to be there.
   Sensor model = sensor;
@@ -352,11 +353,12 @@ PatchConsensus::sampleError(const pcl::Indices& indices) const
       ++finite;
   if (finite == sampleSize())
     return {};
-  const std::string points = "of the " + std::to_string(indices.size()) + " points";
   if (finite == 0 && !indices.empty())
-    return "none " + points + " is finite";
-  return "a sample takes " + std::to_string(sampleSize()) + " points, but " +
-         std::to_string(finite) + ' ' + points + " are finite";
+    return fmt::format("none of the {} points is finite", indices.size());
+  return fmt::format("a sample takes {} points, but {} of the {} points are finite",
+                     sampleSize(),
+                     finite,
+                     indices.size());
 }
 
 ConsensusDistance

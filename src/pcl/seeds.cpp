@@ -166,12 +166,59 @@ nearestDepth(const PixelGrid& grid)
   return nearest;
 }
 
+/// The rays of the columns, or rows, of an image.
+class RaysAlong {
+public:
+  RaysAlong(double focal, double centre, int size)
+  : focal_(focal), centre_(centre), size_(size)
+  {
+    for (int i = 0; i < size; ++i) {
+      const double slope = (i - centre) / focal;
+      rays_.push_back({slope, std::sqrt(1.0 + slope * slope)});
+    }
+  }
+
+  /// x/z, or y/z.
+  double slope(int pixel) const
+  {
+    return rays_[static_cast<std::size_t>(pixel)].slope;
+  }
+
+  /// Those that may meet a ball about the point at depth z of a pixel's ray, whose
+  /// tangents are at s = (x z -+ r sqrt(x^2 + z^2 - r^2)) / (z^2 - r^2): a bound to
+  /// that without the root. \param scale 1 / (z^2 - r^2).
+  PixelRange about(int pixel, double z, double r, double scale) const
+  {
+    if (z <= r)
+      return {0, size_};
+    const Ray& ray = rays_[static_cast<std::size_t>(pixel)];
+    const double middle = focal_ * (z * z * scale * ray.slope) + centre_;
+    const double half = focal_ * (z * r * scale * ray.stretch);
+    const auto toPixel = [this](double p) {
+      return static_cast<int>(std::clamp(p, 0.0, static_cast<double>(size_)));
+    };
+    return {toPixel(middle - half), toPixel(middle + half + 1.0)};
+  }
+
+private:
+  struct Ray {
+    double slope;
+    double stretch; ///< its length over its depth, in the plane of the axis
+  };
+
+  double focal_, centre_;
+  int size_;
+  std::vector<Ray> rays_;
+};
+
 /// Seeds on the pixels of a camera, in lists by cells of the image.
 class SeedsInImage {
 public:
   SeedsInImage(const PixelGrid& grid, double spacing, int cell_px)
   : grid_(grid)
   , spacing_(spacing)
+  , along_row_(grid.camera.fx, grid.camera.cx, grid.camera.width)
+  , along_column_(grid.camera.fy, grid.camera.cy, grid.camera.height)
   , cell_px_(cell_px)
   , columns_((grid.camera.width + cell_px - 1) / cell_px)
   , rows_((grid.camera.height + cell_px - 1) / cell_px)
@@ -185,16 +232,20 @@ public:
   double addIfFree(int u, int v)
   {
     const Eigen::Vector3d p = pointAt(u, v);
-    const PixelWindow window = grid_.ballWindow(p, spacing_);
+    const double z = p.z();
+    const double scale = 1.0 / (z * z - spacing_ * spacing_);
     const auto cells = [this](const PixelRange& pixels, int count) {
       return PixelRange{pixels.begin / cell_px_,
                         std::min((pixels.end - 1) / cell_px_ + 1, count)};
     };
-    const PixelRange columns = cells(window.columns, columns_);
-    const PixelRange rows = cells(window.rows, rows_);
+    const PixelRange columns = cells(along_row_.about(u, z, spacing_, scale), columns_);
+    // No seed is in a row to come.
+    const PixelRange rows =
+        cells(along_column_.about(v, z, spacing_, scale), v / cell_px_ + 1);
     for (int row = rows.begin; row < rows.end; ++row)
-      for (int column = nextSeeds(columns.begin, row); column < columns.end;
-           column = nextSeeds(column + 1, row))
+      for (int column = nextSeeds(columns.begin, columns.end, row);
+           column < columns.end;
+           column = nextSeeds(column + 1, columns.end, row))
         for (int i = first_[cellAt(column, row)]; i != kNone; i = seeds_[i].next) {
           const double squared = (seeds_[i].point - p).squaredNorm();
           if (squared < spacing_ * spacing_)
@@ -226,10 +277,8 @@ private:
 
   Eigen::Vector3d pointAt(int u, int v) const
   {
-    const Camera& camera = grid_.camera;
-    return grid_.row(v)[u] * Eigen::Vector3d((u - camera.cx) / camera.fx,
-                                             (v - camera.cy) / camera.fy,
-                                             1.0);
+    return grid_.row(v)[u] *
+           Eigen::Vector3d(along_row_.slope(u), along_column_.slope(v), 1.0);
   }
 
   std::size_t cellAt(int column, int row) const
@@ -248,24 +297,22 @@ private:
     wordAt(column, row) |= std::uint64_t{1} << (column % kBits);
   }
 
-  /// The next cell with seeds from a column on; beyond the last when there is none.
-  int nextSeeds(int column, int row)
+  /// The next cell with seeds from a column on; no less than `end` when there is none.
+  int nextSeeds(int column, int end, int row)
   {
-    for (; column < columns_; column = (column / kBits + 1) * kBits) {
-      std::uint64_t left = wordAt(column, row) >> (column % kBits);
-      if (left == 0)
-        continue;
-      for (; (left & 1) == 0; left >>= 1)
-        ++column;
-      return column;
+    for (; column < end; column = (column / kBits + 1) * kBits) {
+      const std::uint64_t left = wordAt(column, row) >> (column % kBits);
+      if (left != 0)
+        return column + __builtin_ctzll(left);
     }
-    return columns_;
+    return end;
   }
 
   static constexpr int kBits = 64;
 
   const PixelGrid& grid_;
   double spacing_;
+  RaysAlong along_row_, along_column_;
   int cell_px_, columns_, rows_;
   std::vector<int> first_;
   int words_; ///< of has_seeds_, for a row of cells

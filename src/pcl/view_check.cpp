@@ -2,6 +2,8 @@
 
 #include <pcl/common/point_tests.h>
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -173,14 +175,15 @@ std::string
 ViewCheck::foreignNotice() const
 {
   const std::string assumed =
-      std::string("a noise of 1 mm in every direction is assumed") +
-      (sensor_.pattern.empty() ? "" : ", independent from point to point");
+      fmt::format("a noise of 1 mm in every direction is assumed{}",
+                  sensor_.pattern.empty() ? "" : ", independent from point to point");
   const std::string mistake = likelyMistake();
   if (!mistake.empty())
-    return mistake + "; as they are, " + assumed;
-  return "most points lie where the sensor " + sensor_.name +
-         " cannot see: " + assumed +
-         "; --sigma, another sensor or a covariance field changes that";
+    return fmt::format("{}; as they are, {}", mistake, assumed);
+  return fmt::format("most points lie where the sensor {} cannot see: {}; --sigma, "
+                     "another sensor or a covariance field changes that",
+                     sensor_.name,
+                     assumed);
 }
 
 void

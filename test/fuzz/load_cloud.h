@@ -30,7 +30,7 @@ loadAnything(const std::uint8_t* data, std::size_t size)
     const auto& points = *cloud.points;
     require(std::size_t{points.width} * points.height == points.size(),
             "width * height is the number of points");
-    require(cloud.covariances.empty() || cloud.covariances.size() == points.size(),
+    require(!cloud.hasCovariances() || cloud.covariances->size() == points.size(),
             "there are as many covariances as points, or none");
     const int valid = countValidPoints(cloud);
     require(valid > 0, "a cloud has a valid point");

@@ -37,7 +37,7 @@ bowlCloud(int width, int height, const Pose& pose = {}, bool with_covariances = 
   pcl::PointCloud<pcl::PointXYZ>::Ptr points(
       new pcl::PointCloud<pcl::PointXYZ>(static_cast<std::uint32_t>(width),
                                          static_cast<std::uint32_t>(height)));
-  RangeCloud cloud;
+  auto covariances = std::make_shared<Covariances>();
   for (int v = 0; v < height; ++v)
     for (int u = 0; u < width; ++u) {
       const double du = (u - camera.cx) / camera.fx;
@@ -52,14 +52,16 @@ bowlCloud(int width, int height, const Pose& pose = {}, bool with_covariances = 
       if (with_covariances) {
         const Eigen::Vector3d sigma(4e-4, 5e-4, 1e-3 + 1e-5 * u);
         const Eigen::Matrix3d R = pose.R;
-        cloud.covariances.emplace_back(
+        covariances->emplace_back(
             (R * sigma.cwiseAbs2().asDiagonal() * R.transpose()).cast<float>());
       }
     }
   const float nan = std::numeric_limits<float>::quiet_NaN();
   (*points)[0] = pcl::PointXYZ(nan, nan, nan);
   points->is_dense = false;
+  RangeCloud cloud;
   cloud.points = points;
+  cloud.covariances = covariances;
   cloud.sensor_pose = pose;
   return cloud;
 }

@@ -19,8 +19,9 @@ using CovariancesConstPtr = std::shared_ptr<const Covariances>;
 struct RangeCloud {
   /// Points in the frame of the cloud, m; organized when height > 1. Invalid: NaN.
   pcl::PointCloud<pcl::PointXYZ>::ConstPtr points;
-  /// One per point, or empty: the sensor's noise model is used then.
-  Covariances covariances;
+  /// One per point, shared by the copies of a cloud as the points are; null or empty:
+  /// the sensor's noise model is used.
+  CovariancesConstPtr covariances;
   /// Where the sensor stood: q_cloud = R q_camera + c, camera frame of sensor/camera.h.
   Pose sensor_pose;
   /// Where the origin of the points' frame lies in the file's frame, m: coordinates too
@@ -29,6 +30,11 @@ struct RangeCloud {
   /// The sensor pose was said by the file or by the caller; else it is an assumption,
   /// which is doubted where the points contradict it.
   bool sensor_pose_given = false;
+
+  bool hasCovariances() const
+  {
+    return covariances && !covariances->empty();
+  }
 };
 
 /// Empty when the cloud can be worked on, else one sentence: no points object, width *

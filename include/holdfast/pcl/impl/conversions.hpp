@@ -5,6 +5,7 @@
 
 #include <pcl/common/io.h>
 
+#include <memory>
 #include <type_traits>
 
 namespace holdfast {
@@ -37,9 +38,11 @@ toRangeCloud(const typename pcl::PointCloud<PointT>::ConstPtr& cloud,
     range.points = points;
   }
   if constexpr (std::is_same_v<PointT, PointXYZCovariance>) {
-    range.covariances.reserve(cloud->size());
+    auto covariances = std::make_shared<Covariances>();
+    covariances->reserve(cloud->size());
     for (const PointXYZCovariance& point : *cloud)
-      range.covariances.push_back(point.getCovarianceMatrix());
+      covariances->push_back(point.getCovarianceMatrix());
+    range.covariances = covariances;
   }
   range.sensor_pose = sensorPose(cloud->sensor_origin_, cloud->sensor_orientation_);
   int zeros = 0;

@@ -125,7 +125,7 @@ PatchEstimation<PointInT, PointOutT>::rangeCloud()
     cloud.sensor_pose_given = true;
   }
   if (covariances_)
-    cloud.covariances = *covariances_;
+    cloud.covariances = covariances_;
   return cloud;
 }
 

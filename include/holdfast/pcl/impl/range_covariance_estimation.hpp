@@ -36,7 +36,7 @@ Covariances
 RangeCovarianceEstimation<PointInT, PointOutT>::covariancesOfIndices() const
 {
   RangeCloud cloud = toRangeCloud<PointInT>(input_);
-  cloud.covariances.clear(); // Points that have some are to get new ones.
+  cloud.covariances.reset(); // Points that have some are to get new ones.
   if (sensor_pose_)
     cloud.sensor_pose = *sensor_pose_;
   return rangeCovariances(cloud, noise_, *indices_);

@@ -119,7 +119,7 @@ SampleConsensusModelPatch<PointT>::updateCloud()
     return;
   RangeCloud cloud = range_;
   if (covariances_)
-    cloud.covariances = *covariances_;
+    cloud.covariances = covariances_;
   if (sensor_pose_)
     cloud.sensor_pose = *sensor_pose_;
   engine_->setCloud(cloud);
