@@ -58,5 +58,5 @@ build_in "$folder" -DCMAKE_BUILD_TYPE=RelWithDebInfo \
 export ASAN_OPTIONS=detect_container_overflow=0
 export LSAN_OPTIONS="suppressions=$root/test/support/leaks.txt:print_suppressions=0"
 export UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1
-export TSAN_OPTIONS=halt_on_error=1
+export TSAN_OPTIONS="halt_on_error=1:suppressions=$root/test/support/races.txt"
 exec ctest --test-dir "$folder" --output-on-failure --parallel 2 "${chosen[@]}" "$@"

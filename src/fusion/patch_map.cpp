@@ -264,19 +264,19 @@ PatchMap::errorOf(const JetMatrix& covariance,
 }
 
 std::vector<WantedSeed>
-PatchMap::wantedSeeds(const Camera& camera) const
+PatchMap::wantedSeeds(const Camera& camera, const Pose& sensor) const
 {
   constexpr double kSmallestCosine = 0.17; // 80 degrees: beyond, nothing is measured
   std::vector<WantedSeed> wanted;
   for (const MapPatch& patch : patches_) {
-    const Eigen::Vector3d p = pose_.toLocal(centreOf(patch));
+    const Eigen::Vector3d p = sensor.toLocal(centreOf(patch));
     if (!(p.z() > 0.0))
       continue;
     const Eigen::Vector2d pixel = camera.project(p);
     if (!(pixel.x() >= 0.0 && pixel.x() <= camera.width - 1 && pixel.y() >= 0.0 &&
           pixel.y() <= camera.height - 1))
       continue;
-    const Eigen::Vector3d n = pose_.R.transpose() * patch.anchor.R.col(2);
+    const Eigen::Vector3d n = sensor.R.transpose() * patch.anchor.R.col(2);
     const double cosine = -n.dot(p.normalized());
     if (cosine < kSmallestCosine)
       continue;
@@ -339,6 +339,17 @@ PatchMap::nearest(const Measurement& measurement, const Pose& sensor) const
     }
   });
   return best;
+}
+
+bool
+PatchMap::hasAnchorWithin(const Eigen::Vector3d& place, double distance_m) const
+{
+  bool is_there = false;
+  visitNear(place, [&](int i) {
+    is_there |=
+        (patches_[static_cast<std::size_t>(i)].anchor.c - place).norm() < distance_m;
+  });
+  return is_there;
 }
 
 UpdateReport
@@ -589,8 +600,7 @@ PatchMap::forget(UpdateReport& report)
 std::size_t
 PatchMap::bucketOf(const Eigen::Vector3d& place, int dx, int dy, int dz) const
 {
-  constexpr double kCell = 0.8; // radii; more than the association radius may be
-  const double cell = std::max(kCell * options_.radius_m, reach());
+  const double cell = options_.radius_m; // no reach is longer
   std::uint64_t hash = 0;
   const int offset[3] = {dx, dy, dz};
   for (int axis = 0; axis < 3; ++axis) {

@@ -161,6 +161,16 @@ searchOf(const std::shared_ptr<const NeighborhoodSampler>& sampler,
   };
 }
 
+/// The seeds that come first, and of the others those that are free.
+void
+putFirst(const PatchSites& asked, std::vector<Seed>& seeds)
+{
+  if (asked.is_free)
+    seeds.erase(std::remove_if(seeds.begin(), seeds.end(), std::not_fn(asked.is_free)),
+                seeds.end());
+  seeds.insert(seeds.begin(), asked.first_seeds.begin(), asked.first_seeds.end());
+}
+
 CompleteSites
 completeSites(const PatchSites& asked,
               const ExtractionOptions& options,
@@ -196,6 +206,7 @@ completeSites(const PatchSites& asked,
     const std::size_t before = sites.seeds.size();
     keepPromisingSeeds(chosen, options.sampler, sites.search, sites.seeds, notices);
     sites.promising = sites.seeds.size() == before;
+    putFirst(asked, sites.seeds);
   }
   return sites;
 }
@@ -307,6 +318,7 @@ std::vector<ExtractedPatch>
 attemptAll(const CompleteSites& sites,
            const PatchMaker& maker,
            const ExtractionOptions& options,
+           const PatchObserver& observe,
            SamplingBudget& budget,
            std::vector<std::vector<int>>& supports)
 {
@@ -331,6 +343,8 @@ attemptAll(const CompleteSites& sites,
     const Seed& seed = sites.seeds[i];
     Workspace& work = workspaces[static_cast<std::size_t>(thread)];
     attempts[i] = attemptAt(seed, thread, sites, maker, work);
+    if (observe && isAccepted(attempts[i]))
+      observe(i, attempts[i], work.batch);
     if (!covered.empty())
       covered[i] = work.indices;
     if (keep_supports)
@@ -473,7 +487,7 @@ extractPatches(const RangeCloud& cloud,
   SamplingBudget budget(limits, chosen.cloud.points->size(), start);
   std::vector<std::vector<int>> supports;
   std::vector<ExtractedPatch> attempts =
-      attemptAll(sites, maker, options, budget, supports);
+      attemptAll(sites, maker, options, asked.observe, budget, supports);
   const bool all_tried = attempts.size() == sites.seeds.size();
   if (!asked.seeds)
     noteLimit(attempts.size(), sites.seeds.size(), result.notices);

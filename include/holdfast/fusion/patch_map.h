@@ -159,9 +159,15 @@ public:
     return pose_;
   }
 
-  /// Patches that a camera at the sensor's pose has before it, and that face it. What
-  /// hides them is not known here: sightOf().
-  std::vector<WantedSeed> wantedSeeds(const Camera& camera) const;
+  /// Patches that a camera has before it, and that face it. What hides them is not
+  /// known here: sightOf().
+  /// \param sensor pose in the frame of the map.
+  std::vector<WantedSeed> wantedSeeds(const Camera& camera, const Pose& sensor) const;
+
+  std::vector<WantedSeed> wantedSeeds(const Camera& camera) const
+  {
+    return wantedSeeds(camera, pose_);
+  }
 
   /// Takes the measurements of one frame; ids must differ. The result does not depend
   /// on their order. One measurement feeds at most one patch, and one patch takes at
@@ -181,6 +187,10 @@ public:
   /// The patch nearest to a measurement of the sensor at a pose that may be the same
   /// piece of surface; null: there is none.
   const MapPatch* nearest(const Measurement& measurement, const Pose& sensor) const;
+
+  /// True where a patch's anchor is nearer to a place of the map's frame than this, m;
+  /// at most options().radius_m.
+  bool hasAnchorWithin(const Eigen::Vector3d& place, double distance_m) const;
 
   /// How many updates there were.
   int frames() const

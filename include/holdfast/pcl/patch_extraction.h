@@ -91,6 +91,11 @@ struct Seed {
 using NeighborhoodSearch =
     std::function<void(const Seed& seed, int thread, std::vector<int>& indices)>;
 
+/// Looks at an accepted patch and its points as the fit left them; `attempt` is its
+/// place in the order of the seeds. Called from several threads at once.
+using PatchObserver = std::function<
+    void(std::size_t attempt, const ExtractedPatch& patch, const PointBatch& points)>;
+
 /// Where patches are wanted, and which points belong to them. What is left out is found
 /// by a NeighborhoodSampler, as the options say.
 struct PatchSites {
@@ -98,6 +103,11 @@ struct PatchSites {
   NeighborhoodSearch search; ///< goes with seeds
   /// A stricter search, tried where validation turned down a patch; may be none.
   NeighborhoodSearch second_search;
+  /// Without `seeds`: these come first, and of those that the sampler finds the ones
+  /// that `is_free` says yes to, if there is such a function.
+  std::vector<Seed> first_seeds;
+  std::function<bool(const Seed&)> is_free;
+  PatchObserver observe; ///< may be none
 };
 
 /// The points of the cloud as seeds.

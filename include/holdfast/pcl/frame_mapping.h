@@ -1,0 +1,90 @@
+/// \file From the frames of a moving camera to a map of patches.
+#pragma once
+
+#include <holdfast/fusion/patch_map.h>
+#include <holdfast/fusion/registration.h>
+#include <holdfast/pcl/patch_extraction.h>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace holdfast {
+
+/// How the sensor came from the frame before to this one.
+struct Motion {
+  Pose increment; ///< its new pose in its old frame
+  /// Of (delta, c), as PatchMap::move().
+  JetMatrix covariance = JetMatrix::Zero();
+};
+
+struct MappingOptions {
+  PatchMapOptions map;
+  /// Seeds, neighbourhoods, acceptance. The fits are of paraboloids with the pattern
+  /// apart whatever is said here, and the radius is the map's.
+  ExtractionOptions extraction;
+  RegistrationOptions registration;
+  /// What is known of a motion that nobody tells, before the patches are asked: rad and
+  /// m between frames, one standard deviation.
+  double motion_sigma_rad = 0.05;
+  double motion_sigma_m = 0.05;
+};
+
+/// What a frame did to the map.
+struct FrameReport {
+  UpdateReport update;
+  int asked = 0; ///< seeds that the map wanted, and that could be seen
+  int hidden = 0; ///< of patches before the camera: something is in front of them
+  int measurements = 0;
+  std::optional<RegistrationResult> registration; ///< where no motion was told
+  ExtractionResult extraction; ///< whose patches are those of this frame alone
+};
+
+/// Keeps a map: fits patches where it wants them and where it has none, finds the pose
+/// where it is not told, and updates. The same for any number of threads.
+class FrameMapper {
+public:
+  /// \throw std::invalid_argument when an option makes no sense.
+  FrameMapper(const Sensor& sensor, const MappingOptions& options = {});
+
+  /// Goes on with a map.
+  FrameMapper(const Sensor& sensor, const MappingOptions& options, PatchMap map);
+
+  /// Takes the next frame from a sensor that has moved as told.
+  /// \param frame organized, its sensor pose where the sensor is in its own points.
+  /// \throw std::invalid_argument when the frame is not organized, or the covariance
+  /// of the motion is none (PatchMap::move()).
+  FrameReport add(const RangeCloud& frame, const Motion& motion);
+
+  /// The same from a sensor that has not moved.
+  FrameReport addStill(const RangeCloud& frame);
+
+  /// The same from a sensor of which nobody knows how it has moved: registerPatches()
+  /// finds it, from where the last motion goes on. What that leaves open, and all where
+  /// it fails, is as uncertain as MappingOptions says.
+  FrameReport addUnknown(const RangeCloud& frame);
+
+  const PatchMap& map() const
+  {
+    return map_;
+  }
+
+private:
+  struct Measured;
+  struct Places;
+  Places placesIn(const RangeCloud& frame, const Pose& sensor, FrameReport& report);
+  Measured measure(const RangeCloud& frame, const Pose& sensor, FrameReport& report);
+  void update(const Measured& measured, FrameReport& report);
+  void moveByRegistration(const Measured& measured, FrameReport& report);
+
+  Sensor sensor_;
+  std::optional<Camera> camera_; ///< on whose pixels the frames lie
+  MappingOptions options_;
+  PatchMap map_;
+  Pose last_increment_; ///< of a motion that was found
+};
+
+/// The options of a map for a sensor: how far the errors of its pixels reach.
+PatchMapOptions mapOptionsFor(const Sensor& sensor, PatchMapOptions options = {});
+
+} // namespace holdfast

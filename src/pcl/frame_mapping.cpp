@@ -1,0 +1,247 @@
+#include <holdfast/pcl/frame_mapping.h>
+
+#include <holdfast/pcl/intrinsics.h>
+
+#include <Eigen/Cholesky>
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+#include <stdexcept>
+#include <utility>
+
+namespace holdfast {
+
+namespace {
+
+ExtractionOptions
+extractionFor(const MappingOptions& options)
+{
+  ExtractionOptions extraction = options.extraction;
+  extraction.fit.surface = SurfaceRequest::Paraboloid;
+  extraction.fit.separate_pattern = true;
+  extraction.sampler.radius_m = options.map.radius_m;
+  return extraction;
+}
+
+int
+pixelIndex(const RangeCloud& frame, const Eigen::Vector2d& pixel)
+{
+  return static_cast<int>(std::lround(pixel.y())) *
+             static_cast<int>(frame.points->width) +
+         static_cast<int>(std::lround(pixel.x()));
+}
+
+/// Frame of the cloud; NaN where there is none.
+Eigen::Vector3d
+pointAt(const RangeCloud& frame, int index)
+{
+  return (*frame.points)[static_cast<std::size_t>(index)]
+      .getVector3fMap()
+      .cast<double>();
+}
+
+/// Of the depth of a point in the frame of the camera; 0 where nobody knows.
+double
+depthSigma(const Sensor& sensor, const Eigen::Vector3d& q)
+{
+  if (!sensor.noise || !(q.allFinite() && q.z() > 0.0))
+    return 0.0;
+  return std::sqrt(std::max(0.0, sensor.noise->covariance(q)(2, 2)));
+}
+
+/// Variance of what the patches say nothing of: a motion of a frame nobody has
+/// measured.
+JetMatrix
+priorCovariance(const MappingOptions& options)
+{
+  JetVector variance;
+  variance << Eigen::Vector3d::Constant(options.motion_sigma_rad),
+      Eigen::Vector3d::Constant(options.motion_sigma_m);
+  return variance.cwiseAbs2().asDiagonal();
+}
+
+/// Of the pose in the map, of (delta, c) with c in the axes of the map: what
+/// registration found, and along its null space the prior.
+JetMatrix
+poseCovariance(const RegistrationResult& result, const JetMatrix& prior)
+{
+  const auto& N = result.null_space;
+  if (N.cols() == 0)
+    return result.covariance;
+  const Eigen::MatrixXd information =
+      N.transpose() * prior.diagonal().cwiseInverse().asDiagonal() * N;
+  const Eigen::MatrixXd inverse =
+      information.llt().solve(Eigen::MatrixXd::Identity(N.cols(), N.cols()));
+  return result.covariance + N * inverse * N.transpose();
+}
+
+} // namespace
+
+PatchMapOptions
+mapOptionsFor(const Sensor& sensor, PatchMapOptions options)
+{
+  if (sensor.pattern.empty())
+    return options;
+  double longest = 0.0;
+  for (const PatternWave& wave : sensor.pattern.waves)
+    longest = std::max(longest, wave.length_px);
+  options.pattern_length = longest / sensor.camera.fx;
+  return options;
+}
+
+/// What a frame says.
+struct FrameMapper::Measured {
+  std::vector<Measurement> measurements;
+  std::vector<std::uint64_t> seen_through;
+};
+
+FrameMapper::FrameMapper(const Sensor& sensor, const MappingOptions& options)
+: FrameMapper(sensor, options, PatchMap(options.map))
+{}
+
+FrameMapper::FrameMapper(const Sensor& sensor,
+                         const MappingOptions& options,
+                         PatchMap map)
+: sensor_(sensor), options_(options), map_(std::move(map))
+{
+  if (!(options.motion_sigma_rad > 0.0 && options.motion_sigma_m > 0.0))
+    throw std::invalid_argument("the sigmas of a motion must be positive");
+  options_.map = map_.options();
+  options_.extraction = extractionFor(options_);
+}
+
+/// Where the map wants a frame to be measured.
+struct FrameMapper::Places {
+  std::vector<Seed> seeds;
+  std::vector<std::uint64_t> asking; ///< the patch behind each
+  std::vector<std::uint64_t> seen_through;
+};
+
+FrameMapper::Places
+FrameMapper::placesIn(const RangeCloud& frame, const Pose& sensor, FrameReport& report)
+{
+  if (!camera_)
+    camera_ = matchedSensor(sensor_, frame).camera;
+  std::vector<WantedSeed> wanted = map_.wantedSeeds(*camera_, sensor);
+  // Those first that have waited longest, should the time not suffice for all.
+  std::stable_sort(wanted.begin(),
+                   wanted.end(),
+                   [&](const WantedSeed& a, const WantedSeed& b) {
+                     return map_.find(a.patch)->last_seen <
+                            map_.find(b.patch)->last_seen;
+                   });
+  Places places;
+  for (const WantedSeed& seed : wanted) {
+    const int index = pixelIndex(frame, seed.pixel);
+    const Eigen::Vector3d point = pointAt(frame, index);
+    const Eigen::Vector3d q = frame.sensor_pose.toLocal(point);
+    switch (sightOf(seed, q.z(), depthSigma(sensor_, q))) {
+    case Sight::Seen:
+      places.seeds.push_back({index, point});
+      places.asking.push_back(seed.patch);
+      break;
+    case Sight::Hidden:
+      ++report.hidden;
+      break;
+    case Sight::SeenThrough:
+      places.seen_through.push_back(seed.patch);
+      break;
+    }
+  }
+  report.asked = static_cast<int>(places.seeds.size());
+  return places;
+}
+
+FrameMapper::Measured
+FrameMapper::measure(const RangeCloud& frame, const Pose& sensor, FrameReport& report)
+{
+  if (const std::string error = validityError(frame); !error.empty())
+    throw std::invalid_argument(error);
+  if (frame.points->height < 2)
+    throw std::invalid_argument("a frame must be an organized cloud");
+  constexpr double kFree = 0.75; // of the spacing
+  const double nearest =
+      std::min(kFree * options_.extraction.sampler.spacing_m, options_.map.radius_m);
+  const Pose to_map = sensor * frame.sensor_pose.inverse();
+  const Places places = placesIn(frame, sensor, report);
+  Measured measured;
+  measured.seen_through = places.seen_through;
+  PatchSites sites;
+  sites.first_seeds = places.seeds;
+  sites.is_free = [&](const Seed& seed) {
+    return !map_.hasAnchorWithin(to_map.toWorld(seed.position), nearest);
+  };
+  std::mutex mutex;
+  sites.observe =
+      [&](std::size_t attempt, const ExtractedPatch& patch, const PointBatch& points) {
+        auto m = measurementOf(patch.fit, points, frame.sensor_pose);
+        if (!m)
+          return;
+        m->id = attempt + 1;
+        m->asked_by = attempt < places.asking.size() ? places.asking[attempt] : 0;
+        const std::lock_guard<std::mutex> lock(mutex);
+        measured.measurements.push_back(*m);
+      };
+  report.extraction = extractPatches(frame, sensor_, options_.extraction, sites);
+  camera_ = report.extraction.sensor.camera;
+  report.measurements = static_cast<int>(measured.measurements.size());
+  return measured;
+}
+
+void
+FrameMapper::update(const Measured& measured, FrameReport& report)
+{
+  report.update = map_.update(measured.measurements, measured.seen_through);
+}
+
+FrameReport
+FrameMapper::add(const RangeCloud& frame, const Motion& motion)
+{
+  FrameReport report;
+  map_.move(motion.increment, motion.covariance);
+  update(measure(frame, map_.pose(), report), report);
+  return report;
+}
+
+FrameReport
+FrameMapper::addStill(const RangeCloud& frame)
+{
+  FrameReport report;
+  update(measure(frame, map_.pose(), report), report);
+  return report;
+}
+
+FrameReport
+FrameMapper::addUnknown(const RangeCloud& frame)
+{
+  FrameReport report;
+  const Pose guess = map_.pose() * last_increment_;
+  const Measured measured = measure(frame, guess, report);
+  if (map_.frames() > 0)
+    moveByRegistration(measured, report);
+  update(measured, report);
+  return report;
+}
+
+void
+FrameMapper::moveByRegistration(const Measured& measured, FrameReport& report)
+{
+  const JetMatrix prior = priorCovariance(options_);
+  const Pose before = map_.pose();
+  RegistrationResult result = registerPatches(measured.measurements,
+                                              map_,
+                                              before * last_increment_,
+                                              options_.registration);
+  const bool is_found = result.status == RegistrationStatus::Converged;
+  JetMatrix covariance = is_found ? poseCovariance(result, prior) : prior;
+  // To the axes of the frame before, which increments are in.
+  JetMatrix T = JetMatrix::Identity();
+  T.bottomRightCorner<3, 3>() = before.R.transpose();
+  const Pose increment = before.inverse() * result.pose;
+  map_.move(increment, is_found ? JetMatrix(T * covariance * T.transpose()) : prior);
+  last_increment_ = is_found ? increment : Pose();
+  report.registration = std::move(result);
+}
+
+} // namespace holdfast
