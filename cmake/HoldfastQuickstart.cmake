@@ -16,8 +16,8 @@ set(quickstart_without
   src/sensor/pattern_calibration
   src/uncertainty/stagewise src/uncertainty/second_order
   src/pcl/frame_extraction
-  src/io/range_frame
-  apps/calibrate/ apps/render/ apps/simulate.cpp apps/plot.cpp)
+  src/io/atomic_folder src/io/range_frame src/io/trajectory_file
+  apps/calibrate/ apps/render/ apps/simulate/ apps/plot.cpp)
 # What stands in for them where the rest calls them.
 set(quickstart_instead src/uncertainty/quickstart/left_out_modes.cpp)
 

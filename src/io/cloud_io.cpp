@@ -1,4 +1,5 @@
 #include "cloud_readers.h"
+#include "file_bytes.h"
 #include "pcl/zero_points.h"
 
 #include <holdfast/geometry/gaussian.h>
@@ -12,11 +13,9 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <cerrno>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <iostream>
 #include <memory>
 #include <new>
 
@@ -81,116 +80,25 @@ detectFormat(std::string_view bytes, const std::string& path)
   return formatOfExtension(path);
 }
 
-/// What a file is that is often found where a cloud is expected.
+/// What else is often found where a cloud is expected.
 std::optional<std::string_view>
-nameOfStranger(std::string_view bytes)
+nameOfOtherData(std::string_view bytes)
 {
   using namespace std::string_view_literals;
-  struct Stranger {
+  struct Other {
     std::string_view start, name;
   };
-  constexpr std::string_view kPage = "a web page, not the file itself";
-  static constexpr Stranger kStrangers[]{
-      {"version https://git-lfs"sv, "a Git LFS pointer, not the file itself"},
-      {"/annex/objects/"sv, "a git-annex pointer, not the file itself"},
-      {"../.git/annex/"sv, "a git-annex pointer, not the file itself"},
-      {"\x1f\x8b"sv, "packed by gzip: unpack it first"},
-      {"PK\x03\x04"sv, "packed by zip: unpack it first"},
-      {"BZh"sv, "packed by bzip2: unpack it first"},
-      {"\xfd\x37zXZ"sv, "packed by xz: unpack it first"},
-      {"\x28\xb5\x2f\xfd"sv, "packed by zstd: unpack it first"},
-      {"7z\xbc\xaf"sv, "packed by 7-zip: unpack it first"},
-      {"\xff\xfe"sv, "text in UTF-16: save it as UTF-8"},
-      {"\xfe\xff"sv, "text in UTF-16: save it as UTF-8"},
+  static constexpr Other kOthers[]{
       {"\xff\xd8\xff"sv, "a JPEG image, not a cloud"},
       {"LASF"sv, "a LAS or LAZ file: convert it to PCD or PLY"},
       {"ASTM-E57"sv, "an E57 file: convert it to PCD or PLY"},
       {"#ROSBAG"sv, "a ROS bag: save a cloud of it as PCD"},
       {"PCLZF"sv, "a PCLZF image: convert it to PNG"},
   };
-  for (const Stranger& stranger : kStrangers)
-    if (startsWith(bytes, stranger.start))
-      return stranger.name;
-  std::string start(io::skipToText(bytes).substr(0, 16));
-  for (char& c : start)
-    c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  if (startsWith(start, "<!doctype html") || startsWith(start, "<html") ||
-      startsWith(start, "<head"))
-    return kPage;
-  if (startsWith(start, "<?xml"))
-    return "XML, not a cloud";
-  return std::nullopt;
-}
-
-/// All bytes of a file.
-struct Bytes {
-  std::string text; ///< of a stream
-  std::unique_ptr<char[]> block; ///< of a file; not filled with zeros first
-  std::size_t block_size = 0;
-
-  std::string_view view() const
-  {
-    return block ? std::string_view(block.get(), block_size) : std::string_view(text);
-  }
-};
-
-/// Standard input, a pipe: what has no size beforehand.
-Bytes
-readStream(std::istream& stream)
-{
-  constexpr std::size_t kBlock = 1U << 20U;
-  constexpr std::size_t kLimit = std::size_t{8} << 30U;
-  Bytes bytes;
-  std::string& text = bytes.text;
-  while (stream) {
-    const std::size_t before = text.size();
-    if (before > kLimit)
-      throw std::runtime_error("more than 8 GiB do not come to an end");
-    text.resize(before + kBlock);
-    stream.read(&text[before], static_cast<std::streamsize>(kBlock));
-    text.resize(before + static_cast<std::size_t>(stream.gcount()));
-  }
-  return bytes;
-}
-
-Bytes
-readRegular(const std::string& path, std::istream& file)
-{
-  Bytes bytes;
-  bytes.block_size = std::filesystem::file_size(path);
-  bytes.block.reset(new char[bytes.block_size]);
-  const auto size = static_cast<std::streamsize>(bytes.block_size);
-  file.read(bytes.block.get(), size);
-  if (file.gcount() != size)
-    throw std::runtime_error("could not be read completely");
-  return bytes;
-}
-
-Bytes
-readFile(const std::string& path)
-{
-  namespace fs = std::filesystem;
-  std::error_code error;
-  const fs::file_type type = fs::status(path, error).type();
-  if (type == fs::file_type::not_found)
-    throw std::runtime_error("no such file");
-  if (type == fs::file_type::directory)
-    throw std::runtime_error("is a directory, not a cloud");
-  if (type != fs::file_type::regular && type != fs::file_type::fifo)
-    throw std::runtime_error("is not a regular file");
-  std::ifstream file(path, std::ios::binary);
-  if (!file)
-    throw std::runtime_error("cannot be opened: " + std::string(std::strerror(errno)));
-  return type == fs::file_type::fifo ? readStream(file) : readRegular(path, file);
-}
-
-Bytes
-readBytes(const std::string& path)
-{
-  Bytes bytes = path == "-" ? readStream(std::cin) : readFile(path);
-  if (bytes.view().empty())
-    throw std::runtime_error("is empty");
-  return bytes;
+  for (const Other& other : kOthers)
+    if (startsWith(bytes, other.start))
+      return other.name;
+  return io::nameOfStranger(bytes);
 }
 
 io::RawCloud
@@ -206,9 +114,9 @@ readDepthImage(io::DepthImage image,
 io::RawCloud
 readAny(const std::string& path, const LoadOptions& options)
 {
-  const Bytes content = readBytes(path);
+  const io::FileBytes content = io::readBytes(path, "a cloud");
   const std::string_view bytes = content.view();
-  if (const auto name = nameOfStranger(bytes))
+  if (const auto name = nameOfOtherData(bytes))
     throw std::runtime_error("is " + std::string(*name));
   switch (detectFormat(bytes, path)) {
   case Format::Pcd:

@@ -2,12 +2,10 @@
 #include <holdfast/simulation/reference_scenes.h>
 #include <holdfast/simulation/scene.h>
 
+#include "scene_parts.h"
 #include "sensor/require.h"
 
-#include <Eigen/Geometry>
-
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 
 namespace holdfast {
@@ -18,61 +16,6 @@ using Eigen::Vector3d;
 
 constexpr double kDefaultPatchDistance = 1.0;
 constexpr double kDefaultSceneDistance = 1.2;
-
-template <typename ShapeType, typename... Arguments>
-void
-add(Scene& scene, Arguments&&... arguments)
-{
-  scene.shapes.push_back(
-      std::make_shared<ShapeType>(std::forward<Arguments>(arguments)...));
-}
-
-Pose
-turnedAboutZ(double angle, const Vector3d& center)
-{
-  return {Eigen::AngleAxisd(angle, Vector3d::UnitZ()).toRotationMatrix(), center};
-}
-
-/// A box that stands with its bottom at `foot`.
-void
-addStandingBox(Scene& scene, const Vector3d& foot, const Vector3d& size, double angle)
-{
-  add<Box>(scene, turnedAboutZ(angle, foot + Vector3d(0, 0, 0.5 * size.z())), size);
-}
-
-/// A flat floor at z = 0.
-void
-addFloor(Scene& scene)
-{
-  add<Box>(scene, turnedAboutZ(0.0, {0, 0, -0.05}), Vector3d(6.0, 6.0, 0.1));
-}
-
-/// Looks down at the target by 40 degrees, slightly from the side.
-void
-placeSensor(Scene& scene, const Vector3d& target, double distance)
-{
-  constexpr double kElevation = 0.7;
-  constexpr double kAzimuth = -2.6;
-  const Vector3d direction(std::cos(kElevation) * std::cos(kAzimuth),
-                           std::cos(kElevation) * std::sin(kAzimuth),
-                           std::sin(kElevation));
-  scene.sensor_pose = lookAt(target + distance * direction, target, Vector3d::UnitZ());
-}
-
-/// A half-buried rock.
-void
-addBoulder(Scene& scene,
-           const Terrain& ground,
-           double x,
-           double y,
-           const Vector3d& radii,
-           std::uint64_t seed)
-{
-  const Vector3d center(x, y, ground.heightAt(x, y) + 0.3 * radii.z());
-  // Any angle will do; the golden one never repeats.
-  const double angle = 2.4 * static_cast<double>(seed);
-  add<Boulder>(scene, turnedAboutZ(angle, center), radii, 0.2, seed);
-}
 
 void
 makeRocks(Scene& scene, double distance)
@@ -111,7 +54,7 @@ makePipe(Scene& scene, double distance)
 {
   constexpr double kRadius = 0.06;
   addFloor(scene);
-  add<Pipe>(scene, Vector3d(0, 0, kRadius), Vector3d(0.4, 1.0, 0.0), kRadius, 0.8);
+  addShape<Pipe>(scene, Vector3d(0, 0, kRadius), Vector3d(0.4, 1.0, 0.0), kRadius, 0.8);
   placeSensor(scene, {0, 0, kRadius}, distance);
 }
 
@@ -120,7 +63,7 @@ makeBall(Scene& scene, double distance)
 {
   constexpr double kRadius = 0.12;
   addFloor(scene);
-  add<Ball>(scene, Vector3d(0, 0, kRadius), kRadius);
+  addShape<Ball>(scene, Vector3d(0, 0, kRadius), kRadius);
   placeSensor(scene, {0, 0, kRadius}, distance);
 }
 
@@ -136,8 +79,12 @@ makeTable(Scene& scene, double distance)
     for (const double y : {-0.52, 0.52})
       addStandingBox(scene, {x, y, 0}, {0.05, 0.05, kHeight - kTop}, 0.0);
   addStandingBox(scene, {0.15, -0.20, kHeight}, {0.07, 0.16, 0.22}, 0.5);
-  add<Pipe>(scene, Vector3d(0.0, 0.08, kHeight + 0.06), Vector3d::UnitZ(), 0.04, 0.12);
-  add<Ball>(scene, Vector3d(-0.15, -0.10, kHeight + 0.05), 0.05);
+  addShape<Pipe>(scene,
+                 Vector3d(0.0, 0.08, kHeight + 0.06),
+                 Vector3d::UnitZ(),
+                 0.04,
+                 0.12);
+  addShape<Ball>(scene, Vector3d(-0.15, -0.10, kHeight + 0.05), 0.05);
   placeSensor(scene, {0, 0, kHeight}, distance);
 }
 
@@ -153,8 +100,12 @@ makeMix(Scene& scene, double distance)
   addStandingBox(scene, onGround(0.45, 0.05, -0.1), {0.35, 0.8, 0.25}, 0.1);
   addBoulder(scene, *ground, -0.05, 0.22, {0.17, 0.14, 0.12}, 12);
   addBoulder(scene, *ground, -0.35, -0.05, {0.11, 0.09, 0.08}, 13);
-  add<Ball>(scene, onGround(-0.05, -0.12, 0.09), 0.09);
-  add<Pipe>(scene, onGround(0.05, -0.42, 0.05), Vector3d(1.0, 0.3, 0.0), 0.05, 0.6);
+  addShape<Ball>(scene, onGround(-0.05, -0.12, 0.09), 0.09);
+  addShape<Pipe>(scene,
+                 onGround(0.05, -0.42, 0.05),
+                 Vector3d(1.0, 0.3, 0.0),
+                 0.05,
+                 0.6);
   placeSensor(scene, {0, 0, 0.08}, distance);
 }
 
@@ -171,7 +122,9 @@ namedScenes()
                                               {"pipe", makePipe},
                                               {"ball", makeBall},
                                               {"table", makeTable},
-                                              {"mix", makeMix}};
+                                              {"mix", makeMix},
+                                              {"boulder_field", makeBoulderField},
+                                              {"stairway", makeStairway}};
   return scenes;
 }
 
@@ -230,6 +183,7 @@ makeScene(const std::string& name, std::optional<double> distance)
     const Scene robot = robotScene(type, d, 0.5, 0.6).scene;
     scene.patches = robot.patches;
     scene.sensor_pose = robot.sensor_pose;
+    scene.middle = robot.patches.front().c;
     return scene;
   }
   for (const NamedScene& candidate : namedScenes()) {

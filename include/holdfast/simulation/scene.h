@@ -17,6 +17,9 @@ struct Scene {
   std::vector<Patch> patches;
   std::vector<std::shared_ptr<const Shape>> shapes;
   Pose sensor_pose; ///< q_world = R q_camera + c
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero(); ///< what makeScene() looks at
+  /// On the ground, where a walk through the scene begins, along +x.
+  Eigen::Vector3d walk_start = {-2.0, 0.0, 0.0};
 };
 
 /// What a ray meets first.
@@ -32,7 +35,8 @@ std::optional<Hit> firstHit(const Scene& scene,
 
 /// Names of all scenes: one for each patch type, "elliptic_paraboloid" to
 /// "circular_cylinder", planes as "plane_ellipse" etc., then "rocks", "stairs", "pipe",
-/// "ball", "table" and "mix".
+/// "ball", "table" and "mix", and two to walk 10 m through: "boulder_field", 170 rocks
+/// on 12 x 3 m of uneven ground, and "stairway", ten steps up, a landing and ten down.
 std::vector<std::string> sceneNames();
 
 /// A scene seen from `distance` metres; by default 1 m for patches, as robotScene() at

@@ -173,6 +173,7 @@ private:
   Eigen::Vector3d radii_;
   std::uint64_t seed_;
   WaveSum bumps_;
+  double outer_radius_ = 0.0; ///< of a ball around the centre that holds it
 };
 
 } // namespace holdfast
