@@ -154,6 +154,7 @@ TEST(MapAllocation, NoneInSteadyState)
   PatchMap map;
   std::vector<Measurement> measurements{*view.measure(estimator, random.engine())};
   map.update(measurements);
+  map.update(measurements); // has seen what it keeps for candidates
   const long before = allocations;
   for (int frame = 0; frame < 10; ++frame) {
     map.move(Pose(), 1e-8 * JetMatrix::Identity());

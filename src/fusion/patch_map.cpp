@@ -19,8 +19,12 @@ namespace {
 
 constexpr int kNone = -1;
 
+// Correlation of two views below which they are independent: exp(-2), two lengths of a
+// wave apart.
+constexpr double kNextToNothing = 0.135;
+
 // The support's moments forget: of more points than this the older ones count half.
-constexpr double kMostPoints = 10'000.0;
+constexpr float kMostPoints = 10'000.0F;
 
 void
 requireValid(const std::string& error)
@@ -55,13 +59,17 @@ covarianceError(const JetMatrix& S)
   return "";
 }
 
-/// Largest magnitude of a principal curvature, from kxx kxy kyy of a surface that is
-/// nearly level.
+/// Largest magnitude of a principal curvature of a surface that is nearly level, as far
+/// as it is known to be one: less two of its sigmas.
 double
-strongestCurvature(const JetVector& jet)
+strongestCurvature(const JetFilter& filter)
 {
+  constexpr double kSigmas = 2.0;
+  const JetVector& jet = filter.value();
   const double mean = 0.5 * (jet[3] + jet[5]), half = 0.5 * (jet[3] - jet[5]);
-  return std::abs(mean) + std::hypot(half, jet[4]);
+  const JetMatrix P = filter.covariance();
+  const double sigma = std::sqrt(std::max(P(3, 3), P(5, 5)));
+  return std::max(0.0, std::abs(mean) + std::hypot(half, jet[4]) - kSigmas * sigma);
 }
 
 Eigen::Vector3d
@@ -81,7 +89,7 @@ isFit(const Measurement& m)
 
 /// Adds the moments of a view, given in its own axes, in the plane of the anchor.
 void
-addMoments(const Measurement& m, const Pose& in_anchor, std::array<double, 6>& sums)
+addMoments(const Measurement& m, const Pose& in_anchor, std::array<float, 6>& sums)
 {
   const Eigen::Matrix2d W = in_anchor.R.topLeftCorner<2, 2>();
   Eigen::Matrix2d M;
@@ -92,10 +100,10 @@ addMoments(const Measurement& m, const Pose& in_anchor, std::array<double, 6>& s
   const double added[6] =
       {n, n * c.x(), n * c.y(), n * S(0, 0), n * S(0, 1), n * S(1, 1)};
   for (std::size_t i = 0; i < sums.size(); ++i)
-    sums[i] += added[i];
+    sums[i] += static_cast<float>(added[i]);
   if (sums[0] > kMostPoints)
-    for (double& sum : sums)
-      sum *= 0.5;
+    for (float& sum : sums)
+      sum *= 0.5F;
 }
 
 /// Covariance of xx xy yy in the axes of the anchor.
@@ -116,6 +124,29 @@ beginEpochOf(const Measurement& m, MapPatch& patch)
   const Eigen::Vector3d& p = m.anchor.c;
   patch.epoch_direction = (p.head<2>() / p.z()).cast<float>();
   patch.epoch_depth_m = static_cast<float>(p.z());
+  patch.epoch_kept.setOnes();
+}
+
+/// Of height, slopes and curvatures, for each number of a jet.
+JetVector
+byOrder(const Eigen::Vector3d& of)
+{
+  return (JetVector() << of[0], of[1], of[1], of[2], of[2], of[2]).finished();
+}
+
+/// What of the pattern of the epoch's start is left in a view.
+Eigen::Vector3d
+patternLeft(const Measurement& m, const MapPatch& patch, const PatchMapOptions& options)
+{
+  const Eigen::Vector3d& p = m.anchor.c;
+  const double depth = patch.epoch_depth_m;
+  if (std::abs(p.z() - depth) > options.max_depth_change * depth)
+    return Eigen::Vector3d::Zero();
+  const Eigen::Vector2d direction = p.head<2>() / p.z();
+  // A disc is as wide as a Gaussian of half its radius.
+  return patternCorrelation(options.pattern,
+                            0.5 * m.radius_m / p.z(),
+                            (direction - patch.epoch_direction.cast<double>()).norm());
 }
 
 void
@@ -155,22 +186,15 @@ validityError(const PatchMapOptions& o)
     return "third derivatives must be positive";
   if (o.max_views < 1 || o.conflicts_to_replace < 1)
     return "numbers of views and conflicts must be positive";
-  if (!(o.pattern_length >= 0.0) || !std::isfinite(o.pattern_length))
-    return "the length of the pattern must not be negative";
+  for (const PatternReach& wave : o.pattern)
+    if (!positive(wave.variance) || !(wave.length >= 0.0) ||
+        !std::isfinite(wave.length))
+      return "waves of the pattern must have a variance, and no negative length";
   if (!positive(o.max_depth_change))
     return "the change of depth must be positive";
   if (!positive(o.volume_radius_m) || !positive(o.max_height_sigma_m))
     return "the limits of the map must be positive";
   return "";
-}
-
-double
-MapPatch::roughness(double floor) const
-{
-  const double excess = chi2 - chi2_expected;
-  if (!(excess > 0.0 && chi2_per_roughness > 0.0))
-    return floor;
-  return std::max(floor, std::sqrt(excess / chi2_per_roughness));
 }
 
 Sight
@@ -192,6 +216,7 @@ PatchMap::PatchMap(const PatchMapOptions& options) : options_(options)
   gate_ = boost::math::quantile(
       boost::math::complement(boost::math::chi_squared(6.0), options.gate_level));
   rebuild();
+  poolRoughness({});
 }
 
 PatchMap::PatchMap(Snapshot snapshot) : PatchMap(snapshot.options)
@@ -214,6 +239,7 @@ PatchMap::PatchMap(Snapshot snapshot) : PatchMap(snapshot.options)
   next_id_ = snapshot.next_id;
   patches_ = std::move(snapshot.patches);
   rebuild();
+  poolRoughness({});
 }
 
 PatchMap::Snapshot
@@ -324,13 +350,15 @@ PatchMap::find(std::uint64_t id) const
 }
 
 const MapPatch*
-PatchMap::nearest(const Measurement& measurement, const Pose& sensor) const
+PatchMap::nearest(const Measurement& measurement,
+                  const Pose& sensor,
+                  double reach_m) const
 {
   const Pose anchor = sensor * measurement.anchor;
   const double cosine = std::cos(options_.max_normal_angle_rad);
   const MapPatch* best = nullptr;
-  double least = reach();
-  visitNear(anchor.c, [&](int i) {
+  double least = reach_m > 0.0 ? reach_m : reach();
+  visitWithin(anchor.c, least, [&](int i) {
     const MapPatch& patch = patches_[static_cast<std::size_t>(i)];
     const double distance = (patch.anchor.c - anchor.c).norm();
     if (distance < least && patch.anchor.R.col(2).dot(anchor.R.col(2)) > cosine) {
@@ -370,6 +398,7 @@ PatchMap::update(const std::vector<Measurement>& measurements,
     requireValid(at(order_[i - 1]).id < at(order_[i]).id ?
                      "" :
                      "measurements of a frame must have different ids");
+  poolRoughness(measurements);
   for (const int i : order_)
     take(at(i), report);
   for (const std::uint64_t id : seen_through)
@@ -382,7 +411,45 @@ PatchMap::update(const std::vector<Measurement>& measurements,
   split(report);
   merge(report);
   forget(report);
+  poolRoughness({});
   return report;
+}
+
+void
+PatchMap::poolRoughness(const std::vector<Measurement>& measurements)
+{
+  double excess = 0.0, weight = 0.0;
+  for (const MapPatch& patch : patches_) {
+    excess += patch.chi2 - patch.chi2_expected;
+    weight += patch.chi2_per_roughness;
+  }
+  // In the order of their ids, as everything.
+  for (const int i : order_) {
+    if (measurements.empty())
+      break;
+    const Measurement& m = measurements[static_cast<std::size_t>(i)];
+    if (!isFit(m))
+      continue;
+    excess += m.chi2 - m.chi2_expected;
+    weight += m.design.chi2_per_roughness;
+  }
+  const double floor = options_.s3_floor_per_m2 * options_.s3_floor_per_m2;
+  squared_roughness_ = weight > 0.0 ? std::max(floor, excess / weight) : floor;
+}
+
+double
+PatchMap::roughnessOf(const MapPatch& patch) const
+{
+  const double w = patch.chi2_per_roughness;
+  double squared = squared_roughness_;
+  if (w > 0.0) {
+    // Patches differ as much as their mean; chi-square scatters by twice its own.
+    const double prior = squared * squared;
+    const double scatter = 2.0 * std::max(patch.chi2_expected, 1.0) / (w * w);
+    const double gain = prior / (prior + scatter);
+    squared += gain * ((patch.chi2 - patch.chi2_expected) / w - squared);
+  }
+  return std::max(options_.s3_floor_per_m2, std::sqrt(std::max(squared, 0.0)));
 }
 
 void
@@ -399,7 +466,7 @@ PatchMap::take(const Measurement& m, UpdateReport& report)
   for (const Candidate& candidate : candidates_) {
     MapPatch& patch = patches_[static_cast<std::size_t>(candidate.index)];
     const double distance = (patch.anchor.c - anchor.c).norm();
-    if (strongestCurvature(patch.jet.value()) * distance > options_.max_tilt_rad)
+    if (strongestCurvature(patch.jet) * distance > options_.max_tilt_rad)
       continue;
     is_near = true;
     if (patch.taken_in == frames_)
@@ -432,23 +499,26 @@ PatchMap::fuse(const Measurement& m, const Pose& anchor, MapPatch& patch) const
   const auto jet = transported(m.jet, anchor, patch.anchor, by_third);
   if (!jet)
     return false;
-  JetMatrix white = jet->white + modelError(by_third,
-                                            thirdToJetOfDisc(patch.radius_m),
-                                            patch.roughness(options_.s3_floor_per_m2));
+  JetMatrix white =
+      jet->white +
+      modelError(by_third, thirdToJetOfDisc(patch.radius_m), roughnessOf(patch));
   if (pose_covariance_)
     white += errorOf(*pose_covariance_, jet->value, patch.anchor);
-  const Eigen::Vector3d p = m.anchor.c;
-  const Eigen::Vector2d direction = p.head<2>() / p.z();
-  const double moved = (direction - patch.epoch_direction.cast<double>()).norm();
-  const bool is_new_epoch =
-      jet->pattern.isZero(0.0) || moved > 2.0 * options_.pattern_length ||
-      std::abs(p.z() - static_cast<double>(patch.epoch_depth_m)) >
-          options_.max_depth_change * static_cast<double>(patch.epoch_depth_m);
+  const Eigen::Vector3d left = patternLeft(m, patch, options_);
+  const bool is_new_epoch = jet->pattern.isZero(0.0) || left[0] < kNextToNothing;
   JetFilter filter = patch.jet;
+  Eigen::Vector3d kept = Eigen::Vector3d::Zero();
   if (is_new_epoch) {
-    filter.beginEpoch(jet->pattern);
+    filter.changePattern(JetVector::Zero(), jet->pattern);
     if (patch.epochs >= options_.max_views)
       filter.fade(1.0 + 1.0 / options_.max_views);
+  }
+  else {
+    // What was lost on the way does not come back.
+    kept = left.cwiseMin(patch.epoch_kept.cast<double>());
+    const Eigen::Vector3d step =
+        kept.cwiseQuotient(patch.epoch_kept.cast<double>().cwiseMax(1e-9));
+    filter.changePattern(byOrder(step), jet->pattern);
   }
   if (!(filter.distance(jet->value, white) <= gate_) ||
       !filter.update(jet->value, white))
@@ -457,6 +527,9 @@ PatchMap::fuse(const Measurement& m, const Pose& anchor, MapPatch& patch) const
   if (is_new_epoch) {
     ++patch.epochs;
     beginEpochOf(m, patch);
+  }
+  else {
+    patch.epoch_kept = kept.cast<float>();
   }
   addView(m, anchor, patch);
   return true;
@@ -526,7 +599,7 @@ PatchMap::split(UpdateReport& report)
   constexpr double kMisfit = 2.0; // chi2 over its expectation
   for (MapPatch& patch : patches_)
     if (patch.last_seen == frames_ && patch.chi2 > kMisfit * patch.chi2_expected &&
-        patch.roughness(options_.s3_floor_per_m2) > options_.s3_limit_per_m2 &&
+        roughnessOf(patch) > options_.s3_limit_per_m2 &&
         0.5 * patch.radius_m >= options_.min_radius_m && !patch.restarts) {
       patch.radius_m *= 0.5;
       patch.restarts = true;
@@ -556,7 +629,7 @@ PatchMap::merge(UpdateReport& report)
       const double distance = (patch.anchor.c - other.anchor.c).norm();
       if (k == i || is_dropped_[i] || is_dropped_[k] || other.radius_m == 0.0 ||
           distance >= nearest || other.radius_m != patch.radius_m ||
-          strongestCurvature(patch.jet.value()) * distance > options_.max_tilt_rad)
+          strongestCurvature(patch.jet) * distance > options_.max_tilt_rad)
         return;
       const Jet jet{other.jet.value(), other.jet.covariance(), JetMatrix::Zero()};
       const ThirdToJet by_third =
@@ -662,6 +735,27 @@ PatchMap::visitNear(const Eigen::Vector3d& place, Visit&& visit) const
          i = next_[static_cast<std::size_t>(i)])
       if (patches_[static_cast<std::size_t>(i)].radius_m > 0.0)
         visit(i);
+}
+
+// Any distance; where cells share a bucket, its patches are visited again.
+template <typename Visit>
+void
+PatchMap::visitWithin(const Eigen::Vector3d& place,
+                      double distance_m,
+                      Visit&& visit) const
+{
+  if (distance_m <= options_.radius_m) {
+    visitNear(place, visit);
+    return;
+  }
+  const int n = static_cast<int>(std::ceil(distance_m / options_.radius_m));
+  for (int dx = -n; dx <= n; ++dx)
+    for (int dy = -n; dy <= n; ++dy)
+      for (int dz = -n; dz <= n; ++dz)
+        for (int i = first_[bucketOf(place, dx, dy, dz)]; i != kNone;
+             i = next_[static_cast<std::size_t>(i)])
+          if (patches_[static_cast<std::size_t>(i)].radius_m > 0.0)
+            visit(i);
 }
 
 } // namespace holdfast

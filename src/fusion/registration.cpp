@@ -55,7 +55,10 @@ spuriousInformation(const Measurement& m,
 /// FUSION 5: with the relative pose of the measurement's anchor in the patch's,
 /// d(phi, t) = [Rb^T 0; -Ra^T R [c]x Ra^T] d(delta, c) of the sensor.
 std::optional<Pair>
-pairAt(const Measurement& m, const MapPatch& patch, const Pose& sensor, double s3_floor)
+pairAt(const Measurement& m,
+       const MapPatch& patch,
+       const PatchMap& map,
+       const Pose& sensor)
 {
   const Pose relative = patch.anchor.inverse() * (sensor * m.anchor);
   const ThirdToJet by_third =
@@ -64,8 +67,7 @@ pairAt(const Measurement& m, const MapPatch& patch, const Pose& sensor, double s
   if (!moved)
     return std::nullopt;
   Pair pair{&m, &patch, m.jet.value - moved->value, {}, {}, {}, 0.0};
-  const JetMatrix Q =
-      modelError(m.design.by_third, by_third, patch.roughness(s3_floor));
+  const JetMatrix Q = modelError(m.design.by_third, by_third, map.roughnessOf(patch));
   const JetMatrix& F = moved->by_jet;
   const JetMatrix predicted = F * patch.jet.covariance() * F.transpose();
   const Eigen::LLT<JetMatrix> factor(JetMatrix(m.jet.covariance() + predicted + Q));
@@ -91,14 +93,14 @@ std::vector<Pair>
 pairsAt(const std::vector<Measurement>& measurements,
         const PatchMap& map,
         const Pose& sensor,
+        double reach_m,
         int& unmatched)
 {
   std::vector<Pair> pairs;
   unmatched = 0;
   for (const Measurement& m : measurements) {
-    const MapPatch* patch = map.nearest(m, sensor);
-    const auto pair =
-        patch ? pairAt(m, *patch, sensor, map.options().s3_floor_per_m2) : std::nullopt;
+    const MapPatch* patch = map.nearest(m, sensor, reach_m);
+    const auto pair = patch ? pairAt(m, *patch, map, sensor) : std::nullopt;
     if (pair)
       pairs.push_back(*pair);
     else
@@ -220,13 +222,15 @@ NormalEquations
 equationsAt(const std::vector<Measurement>& measurements,
             const PatchMap& map,
             double gate,
+            double reach_m,
             std::optional<double> robust_distance,
             RegistrationResult& result)
 {
   NormalEquations equations;
   result.pairs = result.gated = 0;
   result.chi2 = 0.0;
-  for (const Pair& pair : pairsAt(measurements, map, result.pose, result.unmatched)) {
+  for (const Pair& pair :
+       pairsAt(measurements, map, result.pose, reach_m, result.unmatched)) {
     if (!robust_distance && pair.distance > gate) {
       ++result.gated;
       continue;
@@ -260,12 +264,17 @@ registerPatches(const std::vector<Measurement>& measurements,
     result.status = status;
     return result;
   };
+  const double last_reach = map.options().association_radius * map.options().radius_m;
+  double reach = 2.0 * options.first_reach * map.options().radius_m;
   while (result.iterations < options.max_iterations) {
-    const bool is_robust = ++result.iterations <= options.robust_iterations;
+    ++result.iterations;
+    const bool is_robust = reach > last_reach;
+    reach = std::max(last_reach, 0.5 * reach);
     NormalEquations equations =
         equationsAt(measurements,
                     map,
                     gate,
+                    reach,
                     is_robust ? std::optional(options.robust_distance) : std::nullopt,
                     result);
     if (result.pairs < options.min_pairs)

@@ -353,7 +353,7 @@ addParts(const FitResult& fit, io::JsonObject& json)
 
 /// What only patches of a map have.
 void
-addMapPatch(const MapPatch& patch, io::JsonObject& json)
+addMapPatch(const PatchMap& of, const MapPatch& patch, io::JsonObject& json)
 {
   io::JsonObject map(json.member("map"));
   map.add("id", patch.id);
@@ -362,7 +362,7 @@ addMapPatch(const MapPatch& patch, io::JsonObject& json)
   map.add("last_seen", patch.last_seen);
   map.add("conflicts", patch.conflicts);
   map.add("radius", patch.radius_m);
-  map.add("roughness", patch.roughness(0.0));
+  map.add("roughness", of.roughnessOf(patch));
   map.add("anchor_position", patch.anchor.c);
   map.addMatrix("anchor_rotation", patch.anchor.R);
   map.add("jet", patch.jet.value());
@@ -386,7 +386,7 @@ appendPatch(const ExtractedPatch& extracted,
   addOrigin(extracted, report.offset, json);
   addParts(extracted.fit, json);
   if (report.map)
-    addMapPatch(report.map->patches()[index], json);
+    addMapPatch(*report.map, report.map->patches()[index], json);
   json.end();
 }
 

@@ -19,7 +19,7 @@ namespace {
 constexpr std::string_view kSignature = "holdfast patch map\n";
 constexpr std::uint32_t kVersion = 1;
 constexpr std::uint64_t kMostPatches = 100'000'000;
-constexpr std::uint64_t kLongestName = 1000;
+constexpr std::uint64_t kLongestName = 1000, kMostWaves = 1000;
 
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
               "maps are stored as little-endian machines have them");
@@ -103,13 +103,21 @@ pass(Archive& archive, PatchMapOptions& o)
                     &o.s3_floor_per_m2,
                     &o.s3_limit_per_m2,
                     &o.min_radius_m,
-                    &o.pattern_length,
                     &o.max_depth_change,
                     &o.volume_radius_m,
                     &o.max_height_sigma_m})
     archive.value(*x);
   archive.value(o.max_views);
   archive.value(o.conflicts_to_replace);
+  std::uint64_t waves = o.pattern.size();
+  archive.value(waves);
+  if (waves > kMostWaves)
+    throw std::runtime_error("is damaged: its pattern has too many waves");
+  o.pattern.resize(waves);
+  for (PatternReach& wave : o.pattern) {
+    archive.value(wave.variance);
+    archive.value(wave.length);
+  }
 }
 
 template <typename Archive>
@@ -143,6 +151,7 @@ pass(Archive& archive, MapPatch& patch)
   archive.value(patch.chi2_per_roughness);
   pass(archive, patch.epoch_direction);
   archive.value(patch.epoch_depth_m);
+  pass(archive, patch.epoch_kept);
   for (int* x : {&patch.views,
                  &patch.epochs,
                  &patch.conflicts,

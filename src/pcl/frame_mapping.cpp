@@ -90,10 +90,7 @@ mapOptionsFor(const Sensor& sensor, PatchMapOptions options)
 {
   if (sensor.pattern.empty())
     return options;
-  double longest = 0.0;
-  for (const PatternWave& wave : sensor.pattern.waves)
-    longest = std::max(longest, wave.length_px);
-  options.pattern_length = longest / sensor.camera.fx;
+  options.pattern = patternReach(CorrelatedNoise(sensor.pattern), sensor.camera.fx);
   return options;
 }
 
@@ -200,6 +197,10 @@ FrameMapper::measure(const RangeCloud& frame, const Pose& sensor, FrameReport& r
         measured.measurements.push_back(*m);
       };
   report.extraction = extractPatches(frame, *matched_, options_.extraction, sites);
+  // In whatever order the threads came to an end with them.
+  std::sort(measured.measurements.begin(),
+            measured.measurements.end(),
+            [](const Measurement& a, const Measurement& b) { return a.id < b.id; });
   report.measurements = static_cast<int>(measured.measurements.size());
   return measured;
 }
@@ -233,30 +234,33 @@ FrameMapper::addUnknown(const RangeCloud& frame)
   FrameReport report;
   const Pose guess = map_.pose() * last_increment_;
   const Measured measured = measure(frame, guess, report);
-  if (map_.frames() > 0)
-    moveByRegistration(measured, report);
-  update(measured, report);
+  if (map_.patches().empty() || moveByRegistration(measured, guess, report))
+    update(measured, report);
   return report;
 }
 
-void
-FrameMapper::moveByRegistration(const Measured& measured, FrameReport& report)
+bool
+FrameMapper::moveByRegistration(const Measured& measured,
+                                const Pose& guess,
+                                FrameReport& report)
 {
-  const JetMatrix prior = priorCovariance(options_);
   const Pose before = map_.pose();
-  RegistrationResult result = registerPatches(measured.measurements,
-                                              map_,
-                                              before * last_increment_,
-                                              options_.registration);
+  RegistrationResult result =
+      registerPatches(measured.measurements, map_, guess, options_.registration);
   const bool is_found = result.status == RegistrationStatus::Converged;
-  JetMatrix covariance = is_found ? poseCovariance(result, prior) : prior;
-  // To the axes of the frame before, which increments are in.
-  JetMatrix T = JetMatrix::Identity();
-  T.bottomRightCorner<3, 3>() = before.R.transpose();
-  const Pose increment = before.inverse() * result.pose;
-  map_.move(increment, is_found ? JetMatrix(T * covariance * T.transpose()) : prior);
-  last_increment_ = is_found ? increment : Pose();
+  if (is_found) {
+    // To the axes of the frame before, which increments are in.
+    JetMatrix T = JetMatrix::Identity();
+    T.bottomRightCorner<3, 3>() = before.R.transpose();
+    last_increment_ = before.inverse() * result.pose;
+    map_.move(last_increment_,
+              T * poseCovariance(result, priorCovariance(options_)) * T.transpose());
+  }
+  else {
+    last_increment_ = Pose();
+  }
   report.registration = std::move(result);
+  return is_found;
 }
 
 } // namespace holdfast

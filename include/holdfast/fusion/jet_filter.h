@@ -36,10 +36,9 @@ struct Packed {
 };
 
 /// A Kalman filter of a jet x at a fixed anchor. A view measures x + b + w: w is white;
-/// the pattern b is common to all views of an epoch, the time in which the sensor sees
-/// the spot through the same pixels, and independent between epochs. So within an epoch
-/// of n views, without motion, the covariance of x tends to that of b, and not to
-/// nothing (FUSION 3).
+/// the pattern b is common to views through the same pixels, and independent where they
+/// have nothing in common. So over n views of a camera that stands still the covariance
+/// of x tends to that of b, and not to nothing (FUSION 3).
 class JetFilter {
 public:
   /// Where a first view leaves it: in an epoch of its own.
@@ -53,8 +52,10 @@ public:
 
   JetMatrix covariance() const;
 
-  /// The spot is seen through other pixels: the pattern is drawn anew.
-  void beginEpoch(const JetMatrix& pattern);
+  /// The spot is seen through other pixels: of the pattern this share of each number is
+  /// left, and the rest is drawn anew.
+  /// \param kept in [0, 1]; zero begins another epoch.
+  void changePattern(const JetVector& kept, const JetMatrix& pattern);
 
   /// What is common to all errors from now on, such as motion: covariance is added.
   void inflate(const JetMatrix& covariance);

@@ -18,6 +18,7 @@
 #include <holdfast/fit/result.h>
 #include <holdfast/fusion/jet_filter.h>
 #include <holdfast/fusion/measurement.h>
+#include <holdfast/fusion/pattern_reach.h>
 #include <holdfast/sensor/camera.h>
 
 #include <array>
@@ -52,11 +53,11 @@ struct PatchMapOptions {
   int max_views = 16;
   /// Refusals of the gate in a row after which a patch is what was measured last.
   int conflicts_to_replace = 3;
-  /// How far the errors of a view reach over the image, as a tangent: the length of the
-  /// pattern's longest wave over the focal length. A spot that has moved by twice as
-  /// much, or whose depth has changed by max_depth_change, is seen through other
-  /// pixels.
-  double pattern_length = 0.05;
+  /// How far the errors that pixels share reach over the view (patternReach()). What of
+  /// them is left when a spot has moved over it is the same error; once that is next to
+  /// nothing, or its depth has changed by max_depth_change, the view is independent.
+  /// Measurements without a pattern are independent always.
+  std::vector<PatternReach> pattern{{1.0, 0.05}};
   double max_depth_change = 0.05;
   /// Patches further from the sensor are forgotten, and those whose height is no longer
   /// known to max_height_sigma_m.
@@ -75,7 +76,7 @@ struct MapPatch {
   double radius_m = 0.0;
   /// Of all points seen, in the anchor's plane: n, Sx, Sy, Sxx, Sxy, Syy (m, m^2); all
   /// are halved when n gets large, so that they follow what is seen.
-  std::array<double, 6> moments{};
+  std::array<float, 6> moments{};
   /// Upper triangle of the covariance of a single view's second moments, m^4: they are
   /// sums over points that are chosen alike each time, and do not average.
   std::array<float, 6> moments_covariance{};
@@ -83,15 +84,14 @@ struct MapPatch {
   double chi2 = 0.0, chi2_expected = 0.0, chi2_per_roughness = 0.0; ///< sums
   Eigen::Vector2f epoch_direction = Eigen::Vector2f::Zero(); ///< x/z, y/z at its start
   float epoch_depth_m = 0.0F;
+  /// Correlation of the pattern with that at its start: height, slopes, curvatures.
+  Eigen::Vector3f epoch_kept = Eigen::Vector3f::Ones();
   int views = 0;
   int epochs = 0; ///< independent views
   int conflicts = 0; ///< in a row
   int last_seen = 0; ///< number of the update
   int taken_in = 0; ///< the same, also of a refused measurement
   bool restarts = false; ///< the next measurement replaces it: its radius has changed
-
-  /// Root mean square third derivative that its misfits show, at least `floor`, 1/m^2.
-  double roughness(double floor) const;
 };
 
 /// A place where the map wants to be measured.
@@ -186,7 +186,15 @@ public:
 
   /// The patch nearest to a measurement of the sensor at a pose that may be the same
   /// piece of surface; null: there is none.
-  const MapPatch* nearest(const Measurement& measurement, const Pose& sensor) const;
+  /// \param reach_m how far its anchor may be; 0: as far as the map associates.
+  const MapPatch* nearest(const Measurement& measurement,
+                          const Pose& sensor,
+                          double reach_m = 0.0) const;
+
+  /// Root mean square third derivative of a patch, 1/m^2, as the misfits of all its
+  /// views tell it, as far as they do: of a single view that is next to nothing, and
+  /// what is taken is that of the whole map.
+  double roughnessOf(const MapPatch& patch) const;
 
   /// True where a patch's anchor is nearer to a place of the map's frame than this, m;
   /// at most options().radius_m.
@@ -240,9 +248,15 @@ private:
   void rebuild();
   template <typename Visit>
   void visitNear(const Eigen::Vector3d& place, Visit&& visit) const;
+  template <typename Visit>
+  void visitWithin(const Eigen::Vector3d& place,
+                   double distance_m,
+                   Visit&& visit) const;
+  void poolRoughness(const std::vector<Measurement>& measurements);
 
   PatchMapOptions options_;
   double gate_ = 0.0;
+  double squared_roughness_ = 0.0; ///< of the whole map
   Pose pose_;
   std::optional<JetMatrix> pose_covariance_; ///< of place(); none: robot-centric
   int frames_ = 0;

@@ -9,10 +9,13 @@ namespace holdfast {
 
 struct RegistrationOptions {
   int max_iterations = 20;
-  /// In the first iterations a pair counts less beyond this many sigmas of its own
-  /// (Huber, on the Mahalanobis distance of its six numbers); then the map's gate
-  /// decides whether it counts.
-  int robust_iterations = 4;
+  /// In the first iteration a measurement looks this many radii of the map for its
+  /// patch, in each of the next half as far as before, until that is as far as the map
+  /// associates: how far off the guess may be.
+  double first_reach = 4.0;
+  /// As long, a pair counts less beyond this many sigmas of its own (Huber, on the
+  /// Mahalanobis distance of its six numbers); then the map's gate decides whether it
+  /// counts.
   double robust_distance = 4.0;
   /// Iterations stop when a step moves no part of the pose by more, in its own sigmas.
   double step_tolerance_sigma = 1e-3;
@@ -49,8 +52,8 @@ struct RegistrationResult {
 };
 
 /// The pose of the sensor at which its measurements fit the map best, from a guess that
-/// is off by less than the map's association radius at the patches. Every patch of the
-/// map is used once.
+/// is off by no more than options.first_reach at the patches. Every patch of the map is
+/// used once.
 RegistrationResult registerPatches(const std::vector<Measurement>& measurements,
                                    const PatchMap& map,
                                    const Pose& guess,

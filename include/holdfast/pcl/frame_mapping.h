@@ -60,8 +60,9 @@ public:
   FrameReport addStill(const RangeCloud& frame);
 
   /// The same from a sensor of which nobody knows how it has moved: registerPatches()
-  /// finds it, from where the last motion goes on. What that leaves open, and all where
-  /// it fails, is as uncertain as MappingOptions says.
+  /// finds it, from where the last motion goes on. What that leaves open is as
+  /// uncertain as MappingOptions says. Where it fails (FrameReport::registration) the
+  /// map stays as it is, and the next frame begins where the last one was found.
   FrameReport addUnknown(const RangeCloud& frame);
 
   const PatchMap& map() const
@@ -76,7 +77,9 @@ private:
   Places placesIn(const RangeCloud& frame, const Pose& sensor, FrameReport& report);
   Measured measure(const RangeCloud& frame, const Pose& sensor, FrameReport& report);
   void update(const Measured& measured, FrameReport& report);
-  void moveByRegistration(const Measured& measured, FrameReport& report);
+  bool moveByRegistration(const Measured& measured,
+                          const Pose& guess,
+                          FrameReport& report);
 
   Sensor sensor_;
   std::optional<Sensor> matched_; ///< with the camera on whose pixels the frames lie
