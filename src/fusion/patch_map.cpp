@@ -87,6 +87,17 @@ isFit(const Measurement& m)
          (m.jet.covariance().diagonal().array() > 0.0).all();
 }
 
+/// Relative change of a measurement's covariance with an error of one sigma of its
+/// normal: that of the cosine it is seen under.
+double
+tiltError(const Measurement& m)
+{
+  const double cosine = std::abs(m.anchor.R.col(2).dot(m.anchor.c)) / m.anchor.c.norm();
+  const double tangent = std::sqrt(std::max(0.0, 1.0 - cosine * cosine)) / cosine;
+  const JetMatrix P = m.jet.covariance();
+  return tangent * std::sqrt(P(1, 1) + P(2, 2));
+}
+
 /// Adds the moments of a view, given in its own axes, in the plane of the anchor.
 void
 addMoments(const Measurement& m, const Pose& in_anchor, std::array<float, 6>& sums)
@@ -180,7 +191,8 @@ validityError(const PatchMapOptions& o)
     return "the association radius must be in (0, 1]";
   if (!(o.gate_level > 0.0 && o.gate_level < 1.0))
     return "the level of the gate must be in (0, 1)";
-  if (!positive(o.max_tilt_rad) || !positive(o.max_normal_angle_rad))
+  if (!positive(o.max_tilt_rad) || !positive(o.max_normal_angle_rad) ||
+      !positive(o.max_uncertainty_rad))
     return "angles must be positive";
   if (!positive(o.s3_floor_per_m2) || !positive(o.s3_limit_per_m2))
     return "third derivatives must be positive";
@@ -457,6 +469,10 @@ PatchMap::take(const Measurement& m, UpdateReport& report)
 {
   if (!isFit(m)) {
     ++report.unfit;
+    return;
+  }
+  if (tiltError(m) > options_.max_uncertainty_rad) {
+    ++report.uncertain;
     return;
   }
   const Pose anchor = pose_ * m.anchor;

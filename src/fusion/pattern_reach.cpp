@@ -14,6 +14,12 @@ patternReach(const CorrelatedNoise& noise, double focal_px)
   return waves;
 }
 
+std::vector<PatternReach>
+singleWave(double length)
+{
+  return {{1.0, length}};
+}
+
 Eigen::Vector3d
 patternCorrelation(const std::vector<PatternReach>& waves, double support, double moved)
 {

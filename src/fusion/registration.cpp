@@ -23,33 +23,22 @@ struct Pair {
   JetVector residual; ///< measured less predicted, at the measurement's own anchor
   JetMatrix information; ///< of the residual
   JetMatrix by_pose; ///< of the prediction, by (delta, c) of the sensor
-  JetMatrix spurious; ///< information on the pose that is none (spuriousInformation)
   double distance; ///< squared, of the residual in its sigmas
 };
 
-/// by_pose follows from the map's jet, whose errors look like a shape that tells the
-/// pose: noise in the curvatures of a plane seems to hold it in x and y. What that adds
-/// to by_pose^T S^-1 by_pose on average.
-/// \param covariance of the prediction
-JetMatrix
-spuriousInformation(const Measurement& m,
-                    const Pose& sensor,
-                    const JetMatrix& covariance,
-                    const JetMatrix& information)
+/// The jet with curvatures as far as they are more than noise (James and Stein's
+/// estimate). What a jet tells of the pose is by its shape, and noise in the curvatures
+/// of a plane would seem to hold it in x and y.
+JetVector
+withoutNoise(const JetFilter& filter)
 {
-  const Eigen::Vector3d pivot = m.anchor.toLocal(Eigen::Vector3d::Zero());
-  const JetMatrix level = jetByMotion(JetVector::Zero(), pivot);
-  const Eigen::LLT<JetMatrix> root(covariance);
-  const JetMatrix L = root.matrixL();
-  JetMatrix sum = JetMatrix::Zero();
-  for (int i = 0; i < 6; ++i) {
-    const JetMatrix D = jetByMotion(L.col(i), pivot) - level;
-    sum += D.transpose() * information * D;
-  }
-  JetMatrix chain = JetMatrix::Zero();
-  chain.topLeftCorner<3, 3>() = m.anchor.R.transpose();
-  chain.bottomRightCorner<3, 3>() = m.anchor.R.transpose() * sensor.R.transpose();
-  return chain.transpose() * sum * chain;
+  JetVector jet = filter.value();
+  const Eigen::Matrix3d C = filter.covariance().bottomRightCorner<3, 3>();
+  const Eigen::Vector3d k = jet.tail<3>();
+  constexpr double kDegrees = 3.0;
+  const double squared = k.dot(C.llt().solve(k));
+  jet.tail<3>() *= std::max(0.0, 1.0 - kDegrees / squared);
+  return jet;
 }
 
 /// FUSION 5: with the relative pose of the measurement's anchor in the patch's,
@@ -64,9 +53,10 @@ pairAt(const Measurement& m,
   const ThirdToJet by_third =
       movedThirdToJet(thirdToJetOfDisc(patch.radius_m), relative.inverse());
   const auto moved = movedJet(patch.jet.value(), relative, by_third);
-  if (!moved)
+  const auto shape = movedJet(withoutNoise(patch.jet), relative, by_third);
+  if (!moved || !shape)
     return std::nullopt;
-  Pair pair{&m, &patch, m.jet.value - moved->value, {}, {}, {}, 0.0};
+  Pair pair{&m, &patch, m.jet.value - moved->value, {}, {}, 0.0};
   const JetMatrix Q = modelError(m.design.by_third, by_third, map.roughnessOf(patch));
   const JetMatrix& F = moved->by_jet;
   const JetMatrix predicted = F * patch.jet.covariance() * F.transpose();
@@ -80,8 +70,7 @@ pairAt(const Measurement& m,
   chain.topLeftCorner<3, 3>() = m.anchor.R.transpose();
   chain.bottomLeftCorner<3, 3>() = -to_patch * sensor.R * skew(m.anchor.c);
   chain.bottomRightCorner<3, 3>() = to_patch;
-  pair.by_pose = moved->by_pose * chain;
-  pair.spurious = spuriousInformation(m, sensor, predicted, pair.information);
+  pair.by_pose = shape->by_pose * chain;
   if (!pair.by_pose.allFinite() || !std::isfinite(pair.distance))
     return std::nullopt;
   return pair;
@@ -128,7 +117,6 @@ public:
   {
     const JetMatrix weighted = weight * pair.information * pair.by_pose;
     information_ += weighted.transpose() * pair.by_pose;
-    spurious_ += weight * pair.spurious;
     gradient_ += weighted.transpose() * pair.residual;
   }
 
@@ -137,8 +125,7 @@ public:
   {
     JetVector scale = JetVector::Ones();
     scale.head<3>() /= length_m;
-    const JetMatrix scaled =
-        scale.asDiagonal() * (information_ - spurious_) * scale.asDiagonal();
+    const JetMatrix scaled = scale.asDiagonal() * information_ * scale.asDiagonal();
     const Eigen::SelfAdjointEigenSolver<JetMatrix> solver(scaled);
     const JetVector& values = solver.eigenvalues(); // ascending
     lost_ = 0;
@@ -178,7 +165,6 @@ private:
   using Directions = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 6>;
 
   JetMatrix information_ = JetMatrix::Zero();
-  JetMatrix spurious_ = JetMatrix::Zero();
   JetVector gradient_ = JetVector::Zero();
   JetVector step_ = JetVector::Zero();
   JetMatrix covariance_ = JetMatrix::Zero();

@@ -100,6 +100,7 @@ pass(Archive& archive, PatchMapOptions& o)
                     &o.max_normal_angle_rad,
                     &o.gate_level,
                     &o.max_tilt_rad,
+                    &o.max_uncertainty_rad,
                     &o.s3_floor_per_m2,
                     &o.s3_limit_per_m2,
                     &o.min_radius_m,

@@ -16,10 +16,13 @@ namespace holdfast {
 
 /// The best quadric of a scene over a disc in the plane of an anchor, by least squares
 /// along the anchor's axis, as its jet there: what a patch of the map estimates.
+/// \param rms_m if not null: root mean square distance of the surface from it, m. Large
+///        where the disc lies over an edge.
 /// \return nothing where a part of the disc has no surface within two radii.
 std::optional<JetVector> trueJet(const Scene& scene,
                                  const Pose& anchor,
-                                 double radius_m);
+                                 double radius_m,
+                                 double* rms_m = nullptr);
 
 /// The pixels of a camera whose rays meet a scene within a disc.
 class SpotView {

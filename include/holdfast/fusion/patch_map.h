@@ -42,6 +42,11 @@ struct PatchMapOptions {
   /// curvature times distance) gets a patch of its own: the paraboloid about one axis
   /// is none about the other.
   double max_tilt_rad = 0.1;
+  /// A measurement whose normal is uncertain by more than this over the tangent of the
+  /// angle it is seen under tells too little to be fused: at a graze the covariance
+  /// that comes with it follows its own error, and what errs to the one side would
+  /// count more than what errs to the other.
+  double max_uncertainty_rad = 0.05;
   /// Root mean square third derivative that every surface is granted, 1/m^2, and how
   /// large it may become before a misfit (chi2 over twice its expectation) makes a
   /// patch of half the radius.
@@ -57,7 +62,7 @@ struct PatchMapOptions {
   /// them is left when a spot has moved over it is the same error; once that is next to
   /// nothing, or its depth has changed by max_depth_change, the view is independent.
   /// Measurements without a pattern are independent always.
-  std::vector<PatternReach> pattern{{1.0, 0.05}};
+  std::vector<PatternReach> pattern = singleWave(0.05);
   double max_depth_change = 0.05;
   /// Patches further from the sensor are forgotten, and those whose height is no longer
   /// known to max_height_sigma_m.
@@ -114,13 +119,14 @@ enum class Sight : std::uint8_t {
 /// \param sigma_m of that measurement.
 Sight sightOf(const WantedSeed& seed, double depth_m, double sigma_m);
 
-/// What an update did. Every measurement is in one of the first six.
+/// What an update did. Every measurement is in one of the first seven.
 struct UpdateReport {
   int fused = 0;
   int born = 0; ///< no patch was near
   int gated = 0; ///< refused by the gate of the patch near it
   int replaced = 0; ///< refused once too often: the patch is what was measured
   int surplus = 0; ///< the patch near it had its measurement in this frame
+  int uncertain = 0; ///< PatchMapOptions::max_uncertainty_rad
   int unfit = 0; ///< not finite, or with a covariance that is none
   int seen_through = 0; ///< patches that were, of those named
   int merged = 0; ///< patches given up for a better one at the same place

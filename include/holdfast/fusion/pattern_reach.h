@@ -19,6 +19,9 @@ struct PatternReach {
 /// The waves of a pattern as a camera of this focal length has them.
 std::vector<PatternReach> patternReach(const CorrelatedNoise& noise, double focal_px);
 
+/// One wave, where no more is known than how far the pattern reaches.
+std::vector<PatternReach> singleWave(double length);
+
 /// Correlation of what the pattern does to a patch, before and after it has moved over
 /// the view: of its height, its slopes, and its curvatures.
 ///
