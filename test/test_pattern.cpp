@@ -14,6 +14,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <memory>
+#include <vector>
 
 namespace holdfast { namespace {
 
@@ -379,5 +382,146 @@ TEST(Pattern, MonteCarloAgreesWithTheCovariance)
   for (const int i : {r, r + 1, c, c + 1, c + 2})
     EXPECT_NEAR(said(i, i) / found(i, i), 1.0, 0.15) << i;
 }
+
+// Points at random pixels with random directions, padded.
+PointBatch
+randomBatch(int count, Random& random)
+{
+  PointBatch batch;
+  batch.clear(Eigen::Vector3d::Zero());
+  for (int i = 0; i < count; ++i) {
+    batch.add(random.normalVector(), Eigen::Matrix3d::Identity());
+    for (int c = PointBatch::U; c <= PointBatch::EXTRA; ++c)
+      batch.channel(static_cast<PointBatch::Channel>(c))[i] =
+          random.uniform(-20.0, 20.0);
+  }
+  batch.setPattern(std::make_shared<const CorrelatedNoise>(kinectPattern()));
+  batch.pad();
+  return batch;
+}
+
+// Both codes: the fast one shows that vectors agree, the reference what they do.
+class PatternKernel : public testing::TestWithParam<const kernel::Kernel*> {
+protected:
+  static constexpr double kRounding = 1e-12; // of numbers up to 1e3
+};
+
+TEST_P(PatternKernel, PixelSumsAreThoseOfThePointsWithoutPadding)
+{
+  for (int count = 1; count <= 2 * PointBatch::kLaneMultiple + 1; ++count) {
+    Random random(static_cast<std::uint64_t>(count));
+    const PointBatch batch = randomBatch(count, random);
+    const kernel::PatternPoints shared = kernelPattern(batch);
+    kernel::Points points = kernelPoints(batch);
+    points.pattern = &shared;
+    const double about[2] = {3.0, -2.0};
+    kernel::PixelSums sums;
+    GetParam()->accumulatePixels(points, about, sums);
+    const Eigen::Map<const Eigen::ArrayXd> u(shared.pixel[0], count);
+    const Eigen::Map<const Eigen::ArrayXd> v(shared.pixel[1], count);
+    const Eigen::ArrayXd du = u - about[0], dv = v - about[1];
+    EXPECT_EQ(sums.low[0], u.minCoeff());
+    EXPECT_EQ(sums.low[1], v.minCoeff());
+    EXPECT_EQ(sums.high[0], u.maxCoeff());
+    EXPECT_EQ(sums.high[1], v.maxCoeff());
+    EXPECT_NEAR(sums.sum[0], du.sum(), count * kRounding);
+    EXPECT_NEAR(sums.sum[1], dv.sum(), count * kRounding);
+    EXPECT_NEAR(sums.squares[0], du.square().sum(), count * kRounding);
+    EXPECT_NEAR(sums.squares[1], (du * dv).sum(), count * kRounding);
+    EXPECT_NEAR(sums.squares[2], dv.square().sum(), count * kRounding);
+  }
+}
+
+TEST_P(PatternKernel, NeighborsAreAllInTheMiddleAndHalfAtTheEdge)
+{
+  Random random;
+  const PointBatch batch = randomBatch(40, random);
+  const kernel::PatternPoints shared = kernelPattern(batch);
+  kernel::Points points = kernelPoints(batch);
+  points.pattern = &shared;
+  std::vector<double> aligned(48 + 8);
+  void* start = aligned.data();
+  std::size_t space = aligned.size() * sizeof(double);
+  auto* out = static_cast<double*>(std::align(64, 48 * sizeof(double), start, space));
+  const kernel::NeighborVariance neighbors{{1.0, 2.0},
+                                           {0.06, 0.02, 0.05},
+                                           3.0,
+                                           0.5,
+                                           0.4};
+  GetParam()->neighborVariances(points, neighbors, out);
+  for (int i = 0; i < batch.size(); ++i) {
+    const double u = shared.pixel[0][i] - 1.0, v = shared.pixel[1][i] - 2.0;
+    const double inside = 1.0 - std::hypot(0.06 * u, 0.02 * u + 0.05 * v);
+    const double expected = inside <= 0.0 ? 1.0 :
+                            inside >= 0.4 ? 2.5 :
+                                            2.5 - 1.5 * std::pow(1.0 - inside / 0.4, 2);
+    EXPECT_NEAR(out[i], expected, kRounding);
+  }
+}
+
+TEST_P(PatternKernel, SumsOverCellsAreThoseOverAllPairsOfThem)
+{
+  constexpr int kCells = kernel::kCells, kRow = kernel::kCellRow;
+  for (int count = 1; count <= 2 * PointBatch::kLaneMultiple + 1; count += 4) {
+    Random random(static_cast<std::uint64_t>(count));
+    const PointBatch batch = randomBatch(count, random);
+    ResponseRows response;
+    response.reset(batch.paddedSize());
+    kernel::PatternPoints shared = kernelPattern(batch);
+    shared.response = response.data();
+    kernel::Points points = kernelPoints(batch);
+    points.pattern = &shared;
+    const Eigen::Vector3d mean = random.normalVector();
+    // Some pixels lie outside.
+    const kernel::CellGrid grid{{-12.0, -15.0}, 1.0 / 3.0};
+    Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(kCells * kCells, kRow);
+    for (int i = 0; i < count; ++i) {
+      const auto cell = [&](int k) {
+        const double at = (shared.pixel[k][i] - grid.corner[k]) * grid.inverse_side;
+        return std::clamp(static_cast<int>(std::floor(at)), 0, kCells - 1);
+      };
+      Eigen::RowVectorXd y = Eigen::RowVectorXd::Zero(kRow);
+      for (int a = 0; a < kernel::kMaxTheta; ++a)
+        y[a] = response.data()[a * batch.paddedSize() + i] = random.normal();
+      const Eigen::Vector3d q = batch.point(i) - mean;
+      for (int b = 0; b < 3; ++b)
+        y[6 + b] = shared.direction[b][i];
+      for (int e = 0; e < symmetric::kSize; ++e) {
+        const int b = symmetric::kRow[e], c = symmetric::kColumn[e];
+        y[9 + e] = q[b] * shared.direction[c][i] + q[c] * shared.direction[b][i];
+      }
+      expected.row(kCells * cell(1) + cell(0)) += y;
+    }
+    kernel::CellSums cells{};
+    GetParam()->sumInCells(points, mean.data(), grid, cells);
+    for (int cell = 0; cell < kCells * kCells; ++cell)
+      for (int k = 0; k < kRow; ++k)
+        EXPECT_NEAR(cells.y[cell][k], expected(cell, k), count * kRounding);
+
+    Eigen::MatrixXd C(kCells * kCells, kCells * kCells);
+    for (int down = 0; down < kCells; ++down)
+      for (int across = 0; across < kCells; ++across)
+        cells.covariance[down][across] = random.uniform(0.0, 1.0);
+    for (int a = 0; a < C.rows(); ++a)
+      for (int b = 0; b < C.cols(); ++b)
+        C(a, b) = cells.covariance[std::abs(a / kCells - b / kCells)]
+                                  [std::abs(a % kCells - b % kCells)];
+    alignas(64) double sum[kRow][kRow];
+    GetParam()->sumOverCells(cells, sum[0]);
+    const Eigen::MatrixXd pairs = expected.transpose() * C * expected;
+    const double largest = pairs.cwiseAbs().maxCoeff();
+    for (int a = 0; a < kRow; ++a)
+      for (int b = 0; b < kRow; ++b)
+        EXPECT_NEAR(sum[a][b], pairs(a, b), 1e-13 * largest);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Codes,
+                         PatternKernel,
+                         testing::Values(&kernel::kernel(), &kernel::referenceKernel()),
+                         [](const auto& code) {
+                           return std::string(code.index == 0 ? "vectors" :
+                                                                "reference");
+                         });
 
 }} // namespace holdfast

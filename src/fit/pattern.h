@@ -18,6 +18,8 @@
 
 #include <Eigen/Core>
 
+#include <vector>
+
 namespace holdfast {
 
 struct Scatter;
@@ -26,6 +28,30 @@ struct Scatter;
 inline constexpr int kPatternTerms = kernel::kMaxTheta + 9;
 using PatternMatrix =
     Eigen::Matrix<double, kPatternTerms, kPatternTerms, Eigen::DontAlign>;
+
+/// The responses of points, as the kernel wants them: one row per parameter. Memory is
+/// kept between uses.
+class ResponseRows {
+public:
+  /// Zero.
+  void reset(int padded_size)
+  {
+    lines_.assign(static_cast<std::size_t>(kernel::kMaxTheta * padded_size) /
+                      PointBatch::kLaneMultiple,
+                  {});
+  }
+
+  double* data()
+  {
+    return lines_.front().value;
+  }
+
+private:
+  struct alignas(64) Line {
+    double value[PointBatch::kLaneMultiple] = {};
+  };
+  std::vector<Line> lines_;
+};
 
 /// How the points of a patch lie in the image, and the cells over them.
 class PatternSupport {
@@ -42,19 +68,12 @@ public:
   PatternMatrix sum(const PointBatch& batch,
                     const Scatter& scatter,
                     const Eigen::Matrix3d& R,
-                    const double* response) const;
+                    double* response) const;
 
 private:
   bool isShort(const CorrelatedNoise::Component& wave) const;
-  int cellOf(double u, double v) const;
   void writeCovariance(const CorrelatedNoise& noise, kernel::CellSums& cells) const;
-  void addResponses(const PointBatch& batch,
-                    const double* response,
-                    double* cells) const;
-  void addMoments(const PointBatch& batch,
-                  const Eigen::Vector3d& mean,
-                  double* cells) const;
-  void writeExtra(PointBatch& batch) const;
+  void writeExtra(const kernel::Points& points, PointBatch& batch) const;
 
   double u0_ = 0.0, v0_ = 0.0; ///< corner of the grid, px
   double side_px_ = 1.0; ///< of a cell

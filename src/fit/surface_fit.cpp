@@ -276,17 +276,10 @@ public:
     if (shared == nullptr || shared->variance() == 0.0)
       return;
     // Kept between patches: no allocation once they have seen the largest.
-    thread_local std::vector<double> response;
-    response.resize(static_cast<std::size_t>(kernel::kMaxTheta * points_.padded_size));
-    const PointBatch& batch = problem.batch;
-    pattern_ = {{batch.channel(PointBatch::EX),
-                 batch.channel(PointBatch::EY),
-                 batch.channel(PointBatch::EZ)},
-                batch.channel(PointBatch::EXTRA),
-                response.data()};
-    // Rows that the model does not have.
-    const int rows = kernel::parameterCount(problem.model);
-    std::fill(response.begin() + rows * points_.padded_size, response.end(), 0.0);
+    thread_local ResponseRows response;
+    response.reset(points_.padded_size);
+    pattern_ = kernelPattern(problem.batch);
+    pattern_.response = response.data();
     points_.pattern = &pattern_;
   }
 
@@ -345,11 +338,7 @@ private:
                   const UnboundedSurface& surface,
                   kernel::CovarianceSums& sums) const
   {
-    // What the points share is made of terms that all but cancel: single precision has
-    // cost a quarter of a variance.
-    const Precision precision =
-        points.pattern == nullptr ? problem_.precision : Precision::Double;
-    kernel::kernel().accumulateCovariance(precision,
+    kernel::kernel().accumulateCovariance(problem_.precision,
                                           problem_.model,
                                           problem_.residual,
                                           points,
@@ -543,6 +532,17 @@ kernelPoints(const PointBatch& batch)
     points.channel[i] = batch.channel(static_cast<PointBatch::Channel>(i));
   points.padded_size = batch.paddedSize();
   return points;
+}
+
+kernel::PatternPoints
+kernelPattern(const PointBatch& batch)
+{
+  return {{batch.channel(PointBatch::U), batch.channel(PointBatch::V)},
+          {batch.channel(PointBatch::EX),
+           batch.channel(PointBatch::EY),
+           batch.channel(PointBatch::EZ)},
+          batch.channel(PointBatch::EXTRA),
+          nullptr};
 }
 
 kernel::State

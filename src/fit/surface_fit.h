@@ -104,6 +104,9 @@ ThetaMatrix thetaCovariance(const Linearization& linearization,
 /// The batch as the kernel sees it.
 kernel::Points kernelPoints(const PointBatch& batch);
 
+/// What its points share errors by, without responses.
+kernel::PatternPoints kernelPattern(const PointBatch& batch);
+
 /// The surface as the kernel sees it.
 kernel::State kernelState(const UnboundedSurface& surface, const Scatter& scatter);
 

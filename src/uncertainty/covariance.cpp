@@ -148,10 +148,10 @@ addPatternOfPlaneStage(const PatchFit& fit,
 {
   const Eigen::Matrix3d &R = fit.surface.surface.R, &Rp = fit.plane.surface.R;
   const int padded = batch.paddedSize(), room = kernel::kMaxTheta - terms.np;
-  thread_local std::vector<double> response;
+  thread_local ResponseRows response;
   for (int first = 0; first < terms.n; first += room) {
     const int rows = std::min(room, terms.n - first);
-    response.assign(static_cast<std::size_t>(kernel::kMaxTheta * padded), 0.0);
+    response.reset(padded);
     for (int i = 0; i < batch.size(); ++i) {
       const Eigen::Vector3d r = sharedDirection(batch, i);
       Eigen::Matrix<double, kernel::kMaxTheta, 1> y;
@@ -159,7 +159,7 @@ addPatternOfPlaneStage(const PatchFit& fit,
       y.segment(terms.np, rows) =
           terms.surface(i).middleRows(first, rows) * (R.transpose() * r);
       for (int a = 0; a < terms.np + rows; ++a)
-        response[static_cast<std::size_t>(a * padded + i)] = y[a];
+        response.data()[a * padded + i] = y[a];
     }
     const PatternMatrix sum = fit.support.sum(batch, fit.scatter, R, response.data());
     sums.with_surface.block(0, first, terms.np, rows) +=
@@ -243,10 +243,30 @@ noiseOf(const Linearization& l)
   return C;
 }
 
+struct FirstOrder {
+  ParameterMatrix covariance;
+  double cancellation = 1.0; ///< as PatchCovariance::cancellation
+};
+
+// Largest ratio of the variances that the errors alone would make of C to those of the
+// result of J C J^T.
+double
+cancellationIn(const SmallRows& J, const SmallRows& C, const ParameterMatrix& result)
+{
+  double largest = 1.0;
+  for (int i = 0; i < result.rows(); ++i) {
+    double terms = 0.0;
+    for (int k = 0; k < kPatternTerms; ++k)
+      terms += J(i, k) * J(i, k) * C(k, k);
+    largest = std::max(largest, terms / std::abs(result(i, i)));
+  }
+  return largest;
+}
+
 // Of what has the Jacobian F to the joint variables.
 // \param inverse of the Hessian
 // \param l of fit.surface, with all errors or some of them
-ParameterMatrix
+FirstOrder
 firstOrderCovariance(const PatchJacobian& F,
                      const ThetaMatrix& inverse,
                      const Linearization& l,
@@ -267,16 +287,21 @@ firstOrderCovariance(const PatchJacobian& F,
     for (int k = 0; k < 9; ++k)
       J(i, 6 + k) = M(i, k);
   }
-  auto covariance = J.congruence<ParameterMatrix>(noiseOf(l));
+  const SmallRows C = noiseOf(l);
+  FirstOrder result;
+  result.covariance = J.congruence<ParameterMatrix>(C);
+  if (l.has_pattern)
+    result.cancellation = cancellationIn(J, C, result.covariance);
   if (fit.has_plane_stage)
-    covariance +=
+    result.covariance +=
         planeStageCovariance(fit,
                              planeStageSums(fit, batch, options, l.has_pattern),
                              F,
                              G,
                              M,
                              mode);
-  return symmetrized(covariance);
+  result.covariance = symmetrized(result.covariance);
+  return result;
 }
 
 template <typename Jacobian>
@@ -566,11 +591,13 @@ patchCovariance(const PatchFit& fit,
                                 options,
                                 mode);
   };
-  const StateMatrix S = inAxes(fit.surface.linearization);
+  const FirstOrder first = inAxes(fit.surface.linearization);
+  const StateMatrix& S = first.covariance;
   const StateMatrix turn = stateByAxes(bounded.axes);
+  result.cancellation = first.cancellation;
   result.state = propagated(turn, S);
   if (fit.surface.white)
-    result.white_state = propagated(turn, inAxes(*fit.surface.white));
+    result.white_state = propagated(turn, inAxes(*fit.surface.white).covariance);
   result.parameters =
       mode == CovarianceMode::Stagewise ?
           stagewiseCovariance(fit, batch, options) :
