@@ -13,6 +13,9 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -345,6 +348,83 @@ TEST(Pattern, PointsWithoutAPixelAreLeftOut)
   EXPECT_EQ(estimatePatch(batch, FitOptions{}).invalid_points, 2);
 }
 
+// A disc of pixels on a surface far away, tilted by up to a radian, with errors as the
+// pattern has them: as large as the disc itself, or larger.
+PointBatch
+farDisc(double distance, double radius_px, double white_px, Random& random)
+{
+  const NoisePattern pattern = kinectPattern();
+  StereoNoiseModel::Parameters parameters;
+  parameters.sigma_point_px = 0.0;
+  parameters.sigma_disparity_px = std::sqrt(pattern.variance() + white_px * white_px);
+  const StereoNoiseModel noise(parameters);
+  const Eigen::Vector3d centre(0.1 * distance, -0.05 * distance, distance);
+  const double tilt = random.uniform(-1.0, 1.0), turn = random.uniform(-3.0, 3.0);
+  const Eigen::Vector3d normal(std::sin(tilt) * std::cos(turn),
+                               std::sin(tilt) * std::sin(turn),
+                               -std::cos(tilt));
+  const double kappa = random.uniform(-4.0, 4.0) / distance;
+  PointBatch batch;
+  batch.clear(centre);
+  std::vector<Eigen::Vector2d> pixels;
+  const int reach = static_cast<int>(radius_px);
+  for (int i = -reach; i <= reach; ++i)
+    for (int j = -reach; j <= reach; ++j)
+      if (std::hypot(i, j) <= radius_px)
+        pixels.emplace_back(std::round(0.1 * kFocal) + i,
+                            std::round(-0.05 * kFocal) + j);
+  const auto n = static_cast<Eigen::Index>(pixels.size());
+  Eigen::MatrixXd C = white_px * white_px * Eigen::MatrixXd::Identity(n, n);
+  Eigen::VectorXd error(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    error[i] = random.normal();
+    for (Eigen::Index j = 0; j < n; ++j)
+      C(i, j) += pattern.covariance((pixels[i] - pixels[j]).norm());
+  }
+  error = (C.llt().matrixL() * error).eval();
+  batch.setPattern(std::make_shared<const CorrelatedNoise>(pattern));
+  for (int i = 0; i < n; ++i) {
+    const Eigen::Vector3d ray = (pixels[i] / kFocal).homogeneous();
+    Eigen::Vector3d q = ray * (normal.dot(centre) / normal.dot(ray));
+    q += 0.5 * kappa * (q - centre).squaredNorm() * normal;
+    const Eigen::Vector3d r = noise.patternDirection(q);
+    batch.add(q + error[i] * r, noise.covariance(q));
+    for (int k = 0; k < 2; ++k)
+      batch.channel(k == 0 ? PointBatch::U : PointBatch::V)[i] = pixels[i][k];
+    for (int k = 0; k < 3; ++k)
+      batch.channel(static_cast<PointBatch::Channel>(PointBatch::EX + k))[i] = r[k];
+  }
+  return batch;
+}
+
+// A surface leaves of chi2 what is white, and of what is shared no more than there is:
+// whatever the residuals do to the Hessian. In the mean it is what chi2 is.
+TEST(Pattern, ExpectedChi2HoldsFarAway)
+{
+  constexpr int kPatches = 300;
+  double chi2 = 0.0, expected = 0.0;
+  int usable = 0;
+  for (std::uint64_t i = 0; i < kPatches; ++i) {
+    Random random(i);
+    const double white_px = random.uniform(0.02, 0.05);
+    PointBatch batch =
+        farDisc(random.uniform(2.0, 8.0), random.uniform(3.0, 9.0), white_px, random);
+    const FitResult fit = estimatePatch(batch, FitOptions{});
+    if (!isUsable(fit.status))
+      continue;
+    const double white = white_px * white_px;
+    const double white_share = white / (white + kinectPattern().variance());
+    EXPECT_GT(fit.chi2_expected, white_share * fit.chi2_dof);
+    EXPECT_LT(fit.chi2_expected, fit.chi2_dof);
+    chi2 += fit.chi2;
+    expected += fit.chi2_expected;
+    ++usable;
+  }
+  EXPECT_GT(usable, kPatches / 2);
+  // The cells cost some hundredths, as above.
+  EXPECT_NEAR(chi2 / expected, 1.0, 0.05);
+}
+
 // An exponential wave as seven Gaussian ones.
 TEST(CorrelatedNoise, ComponentsAddUpToThePattern)
 {
@@ -439,10 +519,9 @@ TEST_P(PatternKernel, NeighborsAreAllInTheMiddleAndHalfAtTheEdge)
   const kernel::PatternPoints shared = kernelPattern(batch);
   kernel::Points points = kernelPoints(batch);
   points.pattern = &shared;
-  std::vector<double> aligned(48 + 8);
-  void* start = aligned.data();
-  std::size_t space = aligned.size() * sizeof(double);
-  auto* out = static_cast<double*>(std::align(64, 48 * sizeof(double), start, space));
+  PaddedRows rows;
+  rows.reset(1, batch.paddedSize());
+  double* const out = rows.row(0);
   const kernel::NeighborVariance neighbors{{1.0, 2.0},
                                            {0.06, 0.02, 0.05},
                                            3.0,
@@ -465,10 +544,11 @@ TEST_P(PatternKernel, SumsOverCellsAreThoseOverAllPairsOfThem)
   for (int count = 1; count <= 2 * PointBatch::kLaneMultiple + 1; count += 4) {
     Random random(static_cast<std::uint64_t>(count));
     const PointBatch batch = randomBatch(count, random);
-    ResponseRows response;
-    response.reset(batch.paddedSize());
+    PaddedRows rows;
+    rows.reset(kernel::kMaxTheta, batch.paddedSize());
+    double* const response = rows.row(0);
     kernel::PatternPoints shared = kernelPattern(batch);
-    shared.response = response.data();
+    shared.response = response;
     kernel::Points points = kernelPoints(batch);
     points.pattern = &shared;
     const Eigen::Vector3d mean = random.normalVector();
@@ -482,7 +562,7 @@ TEST_P(PatternKernel, SumsOverCellsAreThoseOverAllPairsOfThem)
       };
       Eigen::RowVectorXd y = Eigen::RowVectorXd::Zero(kRow);
       for (int a = 0; a < kernel::kMaxTheta; ++a)
-        y[a] = response.data()[a * batch.paddedSize() + i] = random.normal();
+        y[a] = response[a * batch.paddedSize() + i] = random.normal();
       const Eigen::Vector3d q = batch.point(i) - mean;
       for (int b = 0; b < 3; ++b)
         y[6 + b] = shared.direction[b][i];

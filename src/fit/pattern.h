@@ -29,21 +29,20 @@ inline constexpr int kPatternTerms = kernel::kMaxTheta + 9;
 using PatternMatrix =
     Eigen::Matrix<double, kPatternTerms, kPatternTerms, Eigen::DontAlign>;
 
-/// The responses of points, as the kernel wants them: one row per parameter. Memory is
-/// kept between uses.
-class ResponseRows {
+/// Numbers of the points of a batch, as the kernel wants them; memory is kept between
+/// uses.
+class PaddedRows {
 public:
   /// Zero.
-  void reset(int padded_size)
+  void reset(int rows, int padded_size)
   {
-    lines_.assign(static_cast<std::size_t>(kernel::kMaxTheta * padded_size) /
-                      PointBatch::kLaneMultiple,
-                  {});
+    lines_per_row_ = static_cast<std::size_t>(padded_size / PointBatch::kLaneMultiple);
+    lines_.assign(static_cast<std::size_t>(rows) * lines_per_row_, {});
   }
 
-  double* data()
+  double* row(int i)
   {
-    return lines_.front().value;
+    return lines_[static_cast<std::size_t>(i) * lines_per_row_].value;
   }
 
 private:
@@ -51,6 +50,7 @@ private:
     double value[PointBatch::kLaneMultiple] = {};
   };
   std::vector<Line> lines_;
+  std::size_t lines_per_row_ = 0;
 };
 
 /// How the points of a patch lie in the image, and the cells over them.

@@ -148,10 +148,10 @@ addPatternOfPlaneStage(const PatchFit& fit,
 {
   const Eigen::Matrix3d &R = fit.surface.surface.R, &Rp = fit.plane.surface.R;
   const int padded = batch.paddedSize(), room = kernel::kMaxTheta - terms.np;
-  thread_local ResponseRows response;
+  thread_local PaddedRows response;
   for (int first = 0; first < terms.n; first += room) {
     const int rows = std::min(room, terms.n - first);
-    response.reset(padded);
+    response.reset(kernel::kMaxTheta, padded);
     for (int i = 0; i < batch.size(); ++i) {
       const Eigen::Vector3d r = sharedDirection(batch, i);
       Eigen::Matrix<double, kernel::kMaxTheta, 1> y;
@@ -159,9 +159,9 @@ addPatternOfPlaneStage(const PatchFit& fit,
       y.segment(terms.np, rows) =
           terms.surface(i).middleRows(first, rows) * (R.transpose() * r);
       for (int a = 0; a < terms.np + rows; ++a)
-        response.data()[a * padded + i] = y[a];
+        response.row(a)[i] = y[a];
     }
-    const PatternMatrix sum = fit.support.sum(batch, fit.scatter, R, response.data());
+    const PatternMatrix sum = fit.support.sum(batch, fit.scatter, R, response.row(0));
     sums.with_surface.block(0, first, terms.np, rows) +=
         sum.block(0, terms.np, terms.np, rows);
     if (first == 0)
@@ -458,12 +458,9 @@ double
 expectedChi2(const PatchFit& fit)
 {
   const SurfaceFit& surface = fit.surface;
-  const Linearization& l = surface.linearization;
-  const int p = kernel::parameterCount(surface.surface.model);
-  if (!l.has_pattern)
-    return fit.points - p;
-  const ThetaMatrix gradient = l.XX + l.pattern.topLeftCorner<6, 6>();
-  return fit.points - symmetricInverse(l.H).cwiseProduct(gradient).sum();
+  return fit.points - (surface.linearization.has_pattern ?
+                           surface.taken_up :
+                           kernel::parameterCount(surface.surface.model));
 }
 
 FitStatus
