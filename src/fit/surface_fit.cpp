@@ -5,6 +5,7 @@
 #include "fit/models/models.h"
 #include "geometry/small_cholesky.h"
 #include "geometry/symmetric.h"
+#include "geometry/symmetric_eigen.h"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
@@ -161,13 +162,13 @@ NullSpace
 nullSpaceOf(const ThetaMatrix& H, Model model)
 {
   const Theta scale = unitScale(H, model);
-  const ThetaMatrix scaled = scale.asDiagonal() * H * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> solver(scaled);
+  const SymmetricEigen eigen =
+      symmetricEigen(scale.asDiagonal() * H * scale.asDiagonal());
   NullSpace space(6, 0);
   for (int i = 0; i < 6; ++i) {
-    if (solver.eigenvalues()[i] > kSmallestPivot)
+    if (eigen.values[i] > kSmallestPivot)
       break;
-    const Theta direction = scale.cwiseProduct(solver.eigenvectors().col(i));
+    const Theta direction = scale.cwiseProduct(eigen.vectors.col(i));
     space.conservativeResize(6, space.cols() + 1);
     space.col(space.cols() - 1) = direction.normalized();
   }

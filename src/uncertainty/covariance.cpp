@@ -11,9 +11,6 @@
 #include <holdfast/geometry/rotation.h>
 #include <holdfast/uncertainty/monte_carlo.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -218,9 +215,13 @@ planeStageCovariance(const PatchFit& fit,
   ByTheta F_plane = ByTheta::Zero(G.rows(), 6);
   F_plane.leftCols<3>() = F.middleCols<3>(JointLayout::kPlane);
   const ByTheta Gp = gain(F_plane, symmetricInverse(hessianOf(fit.plane, mode)));
-  const ParameterMatrix cross =
-      Gp * (sums.with_surface * G.transpose() + sums.with_moments * M.transpose());
-  return symmetrized(ParameterMatrix(Gp * sums.own * Gp.transpose() + 2.0 * cross));
+  const ByTheta own = Gp.lazyProduct(sums.own);
+  const ByTheta with_surface = Gp.lazyProduct(sums.with_surface);
+  const ByMoments with_moments = Gp.lazyProduct(sums.with_moments);
+  ParameterMatrix result = own.lazyProduct(Gp.transpose());
+  result += 2.0 * with_surface.lazyProduct(G.transpose());
+  result += 2.0 * with_moments.lazyProduct(M.transpose());
+  return symmetrized(result);
 }
 
 // Covariance of what moves the estimate: X_i dq_i, then the moments (JointLayout).
@@ -229,17 +230,19 @@ noiseOf(const Linearization& l)
 {
   constexpr int kTheta = kernel::kMaxTheta;
   SmallRows C(kPatternTerms);
-  for (int i = 0; i < kPatternTerms; ++i)
-    for (int j = 0; j < kPatternTerms; ++j) {
-      const bool theta_i = i < kTheta, theta_j = j < kTheta;
-      C(i, j) = theta_i && theta_j ? l.XX(i, j) :
-                theta_i            ? l.XD(i, j - kTheta) :
-                theta_j            ? l.XD(j, i - kTheta) :
-                                     l.DD(i - kTheta, j - kTheta);
-      // What errors that points share add.
-      if (l.has_pattern)
-        C(i, j) += l.pattern(i, j);
-    }
+  for (int j = 0; j < kTheta; ++j)
+    for (int i = 0; i < kTheta; ++i)
+      C(i, j) = l.XX(i, j);
+  for (int j = 0; j < kMoments; ++j) {
+    for (int i = 0; i < kTheta; ++i)
+      C(i, kTheta + j) = C(kTheta + j, i) = l.XD(i, j);
+    for (int i = 0; i < kMoments; ++i)
+      C(kTheta + i, kTheta + j) = l.DD(i, j);
+  }
+  // What errors that points share add.
+  for (int j = 0; l.has_pattern && j < kPatternTerms; ++j)
+    for (int i = 0; i < kPatternTerms; ++i)
+      C(i, j) += l.pattern(i, j);
   return C;
 }
 
@@ -316,31 +319,32 @@ JointMatrix
 jointCovariance(const PatchFit& fit, const PointBatch& batch, const FitOptions& options)
 {
   const Linearization& l = fit.surface.linearization;
-  const ThetaMatrix inverse = l.H.llt().solve(ThetaMatrix(ThetaMatrix::Identity()));
+  const ThetaMatrix inverse = symmetricInverse(l.H);
   JointMatrix joint = JointMatrix::Zero();
   joint.topLeftCorner<6, 6>() = thetaCovariance(l, l.H);
-  joint.block<6, 9>(0, JointLayout::kMean) = -inverse * (l.XD + l.A * l.DD);
+  const ThetaByMoments gradient = l.XD + l.A.lazyProduct(l.DD);
+  joint.block<6, 9>(0, JointLayout::kMean) = -inverse.lazyProduct(gradient);
   joint.block<9, 9>(JointLayout::kMean, JointLayout::kMean) = l.DD;
   if (l.has_pattern) {
     const auto with_moments = l.pattern.topRightCorner<6, 9>();
     const auto moments = l.pattern.bottomRightCorner<9, 9>();
-    joint.block<6, 9>(0, JointLayout::kMean) -=
-        inverse * (with_moments + l.A * moments);
+    const ThetaByMoments shared = with_moments + l.A.lazyProduct(moments);
+    joint.block<6, 9>(0, JointLayout::kMean) -= inverse.lazyProduct(shared);
     joint.block<9, 9>(JointLayout::kMean, JointLayout::kMean) += moments;
   }
   if (fit.has_plane_stage) {
     const Linearization& p = fit.plane.linearization;
     const PlaneStageSums sums = planeStageSums(fit, batch, options, l.has_pattern);
-    const ThetaMatrix plane = p.H.llt().solve(ThetaMatrix(ThetaMatrix::Identity()));
+    const ThetaMatrix plane = symmetricInverse(p.H);
     const ThetaMatrix own = plane * sums.own * plane;
-    const ThetaMatrix with_theta =
-        inverse *
-        (sums.with_surface.transpose() + l.A * sums.with_moments.transpose()) * plane;
+    const ThetaMatrix gradients =
+        sums.with_surface.transpose() + l.A.lazyProduct(sums.with_moments.transpose());
+    const ThetaMatrix with_theta = inverse * gradients * plane;
     joint.block<3, 3>(JointLayout::kPlane, JointLayout::kPlane) =
         own.topLeftCorner<3, 3>();
     joint.block<6, 3>(0, JointLayout::kPlane) = with_theta.leftCols<3>();
     joint.block<9, 3>(JointLayout::kMean, JointLayout::kPlane) =
-        -(plane * sums.with_moments).transpose().leftCols<3>();
+        -plane.lazyProduct(sums.with_moments).transpose().leftCols<3>();
   }
   joint.triangularView<Eigen::StrictlyLower>() = joint.transpose();
   // Padding of theta has no variance.
@@ -539,6 +543,35 @@ asksForSecondOrder(const PatchFit& fit, const PatchCovariance& exact)
   return !first && axis <= kSecondOrderAngle && curvature >= kSecondOrderSigmas;
 }
 
+// tr(A^-1 B), A of unit diagonal. Where A is singular, B is with it, and both are what
+// rows that determine the others make them: eliminated from both by the largest pivots.
+double
+traceOfRatio(ParameterMatrix A, ParameterMatrix B)
+{
+  constexpr double kNull = 1e-12;
+  const int n = static_cast<int>(A.rows());
+  bool is_left[kMaxParameters];
+  std::fill_n(is_left, n, true);
+  double trace = 0.0;
+  for (int step = 0; step < n; ++step) {
+    int p = -1;
+    for (int i = 0; i < n; ++i)
+      if (is_left[i] && A(i, i) > (p < 0 ? kNull : A(p, p)))
+        p = i;
+    if (p < 0)
+      break;
+    is_left[p] = false;
+    trace += B(p, p) / A(p, p);
+    const ParameterVector share = A.col(p) / A(p, p), b = B.col(p);
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; is_left[i] && j < n; ++j) {
+        A(i, j) -= share[i] * share[j] * A(p, p);
+        B(i, j) -= share[i] * b[j] + b[i] * share[j] - share[i] * share[j] * b[p];
+      }
+  }
+  return trace;
+}
+
 void
 addSecondOrder(const PatchFit& fit,
                const PointBatch& batch,
@@ -555,8 +588,7 @@ addSecondOrder(const PatchFit& fit,
       scale.asDiagonal() * result.parameters * scale.asDiagonal();
   const ParameterMatrix second =
       scale.asDiagonal() * terms.covariance * scale.asDiagonal();
-  result.nonlinearity = first.completeOrthogonalDecomposition().solve(second).trace() /
-                        static_cast<double>(scale.size());
+  result.nonlinearity = traceOfRatio(first, second) / static_cast<double>(scale.size());
   result.parameters += terms.covariance;
   result.shift = terms.shift;
   result.state += terms.state_covariance;
