@@ -20,13 +20,21 @@ coarsestFor(CovarianceMode mode)
                                              kernel::Precision::Single;
 }
 
-// Terms of the covariance of a centre out of reach all but cancel.
+// Single precision leaves some 1e-7 of the terms of a variance: of what they exceed by
+// more than this, a ten-thousandth cannot be had.
+constexpr double kMostCancellation = 1e3;
+
+// Terms of the covariance of a centre out of reach all but cancel, as may those of
+// shared errors.
 bool
-isWorthAllDigits(const PatchFit& fit, const FitResult& result)
+isWorthAllDigits(const PatchFit& fit,
+                 const PatchCovariance& uncertainty,
+                 const FitResult& result)
 {
   return fit.surface.precision == kernel::Precision::Single &&
          fit.status == FitStatus::Converged &&
-         (!isUsable(result.status) || result.flags.curvature_not_observable);
+         (!isUsable(result.status) || result.flags.curvature_not_observable ||
+          uncertainty.cancellation > kMostCancellation);
 }
 
 void
@@ -56,10 +64,7 @@ PatchEstimator::PatchEstimator(const FitOptions& options, CovarianceMode mode)
 namespace {
 
 FitResult
-resultOf(const PatchFit& fit,
-         const PointBatch& batch,
-         const PatchFitter& fitter,
-         CovarianceMode mode)
+resultOf(const PatchFit& fit, const PatchCovariance& uncertainty)
 {
   FitResult result;
   result.status = fit.status;
@@ -74,7 +79,7 @@ resultOf(const PatchFit& fit,
   result.polish_steps = fit.surface.polish_steps;
   result.null_space = fit.null_space;
   if (fit.status == FitStatus::Converged)
-    attach(fit, patchCovariance(fit, batch, fitter, mode), result);
+    attach(fit, uncertainty, result);
   return result;
 }
 
@@ -85,10 +90,12 @@ PatchEstimator::estimate(PointBatch& batch) const
 {
   const auto& [fitter, mode] = *impl_;
   const PatchFit fit = fitter.fit(batch);
-  const FitResult result = resultOf(fit, batch, fitter, mode);
-  return isWorthAllDigits(fit, result) ?
-             resultOf(fitter.refit(batch, fit), batch, fitter, mode) :
-             result;
+  const PatchCovariance uncertainty = patchCovariance(fit, batch, fitter, mode);
+  const FitResult result = resultOf(fit, uncertainty);
+  if (!isWorthAllDigits(fit, uncertainty, result))
+    return result;
+  const PatchFit again = fitter.refit(batch, fit);
+  return resultOf(again, patchCovariance(again, batch, fitter, mode));
 }
 
 FitResult

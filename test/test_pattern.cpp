@@ -13,7 +13,13 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+
 #include <algorithm>
+#include <cmath>
+#include <memory>
+#include <vector>
 
 namespace holdfast { namespace {
 
@@ -342,6 +348,83 @@ TEST(Pattern, PointsWithoutAPixelAreLeftOut)
   EXPECT_EQ(estimatePatch(batch, FitOptions{}).invalid_points, 2);
 }
 
+// A disc of pixels on a surface far away, tilted by up to a radian, with errors as the
+// pattern has them: as large as the disc itself, or larger.
+PointBatch
+farDisc(double distance, double radius_px, double white_px, Random& random)
+{
+  const NoisePattern pattern = kinectPattern();
+  StereoNoiseModel::Parameters parameters;
+  parameters.sigma_point_px = 0.0;
+  parameters.sigma_disparity_px = std::sqrt(pattern.variance() + white_px * white_px);
+  const StereoNoiseModel noise(parameters);
+  const Eigen::Vector3d centre(0.1 * distance, -0.05 * distance, distance);
+  const double tilt = random.uniform(-1.0, 1.0), turn = random.uniform(-3.0, 3.0);
+  const Eigen::Vector3d normal(std::sin(tilt) * std::cos(turn),
+                               std::sin(tilt) * std::sin(turn),
+                               -std::cos(tilt));
+  const double kappa = random.uniform(-4.0, 4.0) / distance;
+  PointBatch batch;
+  batch.clear(centre);
+  std::vector<Eigen::Vector2d> pixels;
+  const int reach = static_cast<int>(radius_px);
+  for (int i = -reach; i <= reach; ++i)
+    for (int j = -reach; j <= reach; ++j)
+      if (std::hypot(i, j) <= radius_px)
+        pixels.emplace_back(std::round(0.1 * kFocal) + i,
+                            std::round(-0.05 * kFocal) + j);
+  const auto n = static_cast<Eigen::Index>(pixels.size());
+  Eigen::MatrixXd C = white_px * white_px * Eigen::MatrixXd::Identity(n, n);
+  Eigen::VectorXd error(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    error[i] = random.normal();
+    for (Eigen::Index j = 0; j < n; ++j)
+      C(i, j) += pattern.covariance((pixels[i] - pixels[j]).norm());
+  }
+  error = (C.llt().matrixL() * error).eval();
+  batch.setPattern(std::make_shared<const CorrelatedNoise>(pattern));
+  for (int i = 0; i < n; ++i) {
+    const Eigen::Vector3d ray = (pixels[i] / kFocal).homogeneous();
+    Eigen::Vector3d q = ray * (normal.dot(centre) / normal.dot(ray));
+    q += 0.5 * kappa * (q - centre).squaredNorm() * normal;
+    const Eigen::Vector3d r = noise.patternDirection(q);
+    batch.add(q + error[i] * r, noise.covariance(q));
+    for (int k = 0; k < 2; ++k)
+      batch.channel(k == 0 ? PointBatch::U : PointBatch::V)[i] = pixels[i][k];
+    for (int k = 0; k < 3; ++k)
+      batch.channel(static_cast<PointBatch::Channel>(PointBatch::EX + k))[i] = r[k];
+  }
+  return batch;
+}
+
+// A surface leaves of chi2 what is white, and of what is shared no more than there is:
+// whatever the residuals do to the Hessian. In the mean it is what chi2 is.
+TEST(Pattern, ExpectedChi2HoldsFarAway)
+{
+  constexpr int kPatches = 300;
+  double chi2 = 0.0, expected = 0.0;
+  int usable = 0;
+  for (std::uint64_t i = 0; i < kPatches; ++i) {
+    Random random(i);
+    const double white_px = random.uniform(0.02, 0.05);
+    PointBatch batch =
+        farDisc(random.uniform(2.0, 8.0), random.uniform(3.0, 9.0), white_px, random);
+    const FitResult fit = estimatePatch(batch, FitOptions{});
+    if (!isUsable(fit.status))
+      continue;
+    const double white = white_px * white_px;
+    const double white_share = white / (white + kinectPattern().variance());
+    EXPECT_GT(fit.chi2_expected, white_share * fit.chi2_dof);
+    EXPECT_LT(fit.chi2_expected, fit.chi2_dof);
+    chi2 += fit.chi2;
+    expected += fit.chi2_expected;
+    ++usable;
+  }
+  EXPECT_GT(usable, kPatches / 2);
+  // The cells cost some hundredths, as above.
+  EXPECT_NEAR(chi2 / expected, 1.0, 0.05);
+}
+
 // An exponential wave as seven Gaussian ones.
 TEST(CorrelatedNoise, ComponentsAddUpToThePattern)
 {
@@ -379,5 +462,146 @@ TEST(Pattern, MonteCarloAgreesWithTheCovariance)
   for (const int i : {r, r + 1, c, c + 1, c + 2})
     EXPECT_NEAR(said(i, i) / found(i, i), 1.0, 0.15) << i;
 }
+
+// Points at random pixels with random directions, padded.
+PointBatch
+randomBatch(int count, Random& random)
+{
+  PointBatch batch;
+  batch.clear(Eigen::Vector3d::Zero());
+  for (int i = 0; i < count; ++i) {
+    batch.add(random.normalVector(), Eigen::Matrix3d::Identity());
+    for (int c = PointBatch::U; c <= PointBatch::EXTRA; ++c)
+      batch.channel(static_cast<PointBatch::Channel>(c))[i] =
+          random.uniform(-20.0, 20.0);
+  }
+  batch.setPattern(std::make_shared<const CorrelatedNoise>(kinectPattern()));
+  batch.pad();
+  return batch;
+}
+
+// Both codes: the fast one shows that vectors agree, the reference what they do.
+class PatternKernel : public testing::TestWithParam<const kernel::Kernel*> {
+protected:
+  static constexpr double kRounding = 1e-12; // of numbers up to 1e3
+};
+
+TEST_P(PatternKernel, PixelSumsAreThoseOfThePointsWithoutPadding)
+{
+  for (int count = 1; count <= 2 * PointBatch::kLaneMultiple + 1; ++count) {
+    Random random(static_cast<std::uint64_t>(count));
+    const PointBatch batch = randomBatch(count, random);
+    const kernel::PatternPoints shared = kernelPattern(batch);
+    kernel::Points points = kernelPoints(batch);
+    points.pattern = &shared;
+    const double about[2] = {3.0, -2.0};
+    kernel::PixelSums sums;
+    GetParam()->accumulatePixels(points, about, sums);
+    const Eigen::Map<const Eigen::ArrayXd> u(shared.pixel[0], count);
+    const Eigen::Map<const Eigen::ArrayXd> v(shared.pixel[1], count);
+    const Eigen::ArrayXd du = u - about[0], dv = v - about[1];
+    EXPECT_EQ(sums.low[0], u.minCoeff());
+    EXPECT_EQ(sums.low[1], v.minCoeff());
+    EXPECT_EQ(sums.high[0], u.maxCoeff());
+    EXPECT_EQ(sums.high[1], v.maxCoeff());
+    EXPECT_NEAR(sums.sum[0], du.sum(), count * kRounding);
+    EXPECT_NEAR(sums.sum[1], dv.sum(), count * kRounding);
+    EXPECT_NEAR(sums.squares[0], du.square().sum(), count * kRounding);
+    EXPECT_NEAR(sums.squares[1], (du * dv).sum(), count * kRounding);
+    EXPECT_NEAR(sums.squares[2], dv.square().sum(), count * kRounding);
+  }
+}
+
+TEST_P(PatternKernel, NeighborsAreAllInTheMiddleAndHalfAtTheEdge)
+{
+  Random random;
+  const PointBatch batch = randomBatch(40, random);
+  const kernel::PatternPoints shared = kernelPattern(batch);
+  kernel::Points points = kernelPoints(batch);
+  points.pattern = &shared;
+  PaddedRows rows;
+  rows.reset(1, batch.paddedSize());
+  double* const out = rows.row(0);
+  const kernel::NeighborVariance neighbors{{1.0, 2.0},
+                                           {0.06, 0.02, 0.05},
+                                           3.0,
+                                           0.5,
+                                           0.4};
+  GetParam()->neighborVariances(points, neighbors, out);
+  for (int i = 0; i < batch.size(); ++i) {
+    const double u = shared.pixel[0][i] - 1.0, v = shared.pixel[1][i] - 2.0;
+    const double inside = 1.0 - std::hypot(0.06 * u, 0.02 * u + 0.05 * v);
+    const double expected = inside <= 0.0 ? 1.0 :
+                            inside >= 0.4 ? 2.5 :
+                                            2.5 - 1.5 * std::pow(1.0 - inside / 0.4, 2);
+    EXPECT_NEAR(out[i], expected, kRounding);
+  }
+}
+
+TEST_P(PatternKernel, SumsOverCellsAreThoseOverAllPairsOfThem)
+{
+  constexpr int kCells = kernel::kCells, kRow = kernel::kCellRow;
+  for (int count = 1; count <= 2 * PointBatch::kLaneMultiple + 1; count += 4) {
+    Random random(static_cast<std::uint64_t>(count));
+    const PointBatch batch = randomBatch(count, random);
+    PaddedRows rows;
+    rows.reset(kernel::kMaxTheta, batch.paddedSize());
+    double* const response = rows.row(0);
+    kernel::PatternPoints shared = kernelPattern(batch);
+    shared.response = response;
+    kernel::Points points = kernelPoints(batch);
+    points.pattern = &shared;
+    const Eigen::Vector3d mean = random.normalVector();
+    // Some pixels lie outside.
+    const kernel::CellGrid grid{{-12.0, -15.0}, 1.0 / 3.0};
+    Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(kCells * kCells, kRow);
+    for (int i = 0; i < count; ++i) {
+      const auto cell = [&](int k) {
+        const double at = (shared.pixel[k][i] - grid.corner[k]) * grid.inverse_side;
+        return std::clamp(static_cast<int>(std::floor(at)), 0, kCells - 1);
+      };
+      Eigen::RowVectorXd y = Eigen::RowVectorXd::Zero(kRow);
+      for (int a = 0; a < kernel::kMaxTheta; ++a)
+        y[a] = response[a * batch.paddedSize() + i] = random.normal();
+      const Eigen::Vector3d q = batch.point(i) - mean;
+      for (int b = 0; b < 3; ++b)
+        y[6 + b] = shared.direction[b][i];
+      for (int e = 0; e < symmetric::kSize; ++e) {
+        const int b = symmetric::kRow[e], c = symmetric::kColumn[e];
+        y[9 + e] = q[b] * shared.direction[c][i] + q[c] * shared.direction[b][i];
+      }
+      expected.row(kCells * cell(1) + cell(0)) += y;
+    }
+    kernel::CellSums cells{};
+    GetParam()->sumInCells(points, mean.data(), grid, cells);
+    for (int cell = 0; cell < kCells * kCells; ++cell)
+      for (int k = 0; k < kRow; ++k)
+        EXPECT_NEAR(cells.y[cell][k], expected(cell, k), count * kRounding);
+
+    Eigen::MatrixXd C(kCells * kCells, kCells * kCells);
+    for (int down = 0; down < kCells; ++down)
+      for (int across = 0; across < kCells; ++across)
+        cells.covariance[down][across] = random.uniform(0.0, 1.0);
+    for (int a = 0; a < C.rows(); ++a)
+      for (int b = 0; b < C.cols(); ++b)
+        C(a, b) = cells.covariance[std::abs(a / kCells - b / kCells)]
+                                  [std::abs(a % kCells - b % kCells)];
+    alignas(64) double sum[kRow][kRow];
+    GetParam()->sumOverCells(cells, sum[0]);
+    const Eigen::MatrixXd pairs = expected.transpose() * C * expected;
+    const double largest = pairs.cwiseAbs().maxCoeff();
+    for (int a = 0; a < kRow; ++a)
+      for (int b = 0; b < kRow; ++b)
+        EXPECT_NEAR(sum[a][b], pairs(a, b), 1e-13 * largest);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Codes,
+                         PatternKernel,
+                         testing::Values(&kernel::kernel(), &kernel::referenceKernel()),
+                         [](const auto& code) {
+                           return std::string(code.index == 0 ? "vectors" :
+                                                                "reference");
+                         });
 
 }} // namespace holdfast

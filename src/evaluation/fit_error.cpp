@@ -1,8 +1,8 @@
 #include "evaluation/fit_error.h"
 
-#include <holdfast/geometry/rotation.h>
+#include "geometry/symmetric_eigen.h"
 
-#include <Eigen/Eigenvalues>
+#include <holdfast/geometry/rotation.h>
 
 #include <boost/math/distributions/chi_squared.hpp>
 
@@ -47,15 +47,13 @@ mahalanobis(const ParameterVector& error, const ParameterMatrix& covariance)
   // Parameters differ in unit: scale to correlations, so that one tolerance decides.
   constexpr double kNull = 1e-9;
   const ParameterVector inverse = covariance.diagonal().cwiseSqrt().cwiseInverse();
-  const ParameterMatrix correlation =
-      inverse.asDiagonal() * covariance * inverse.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<ParameterMatrix> solver(correlation);
-  const ParameterVector y =
-      solver.eigenvectors().transpose() * inverse.cwiseProduct(error);
+  const SymmetricEigen eigen =
+      symmetricEigen(inverse.asDiagonal() * covariance * inverse.asDiagonal());
+  const ParameterVector y = eigen.vectors.transpose() * inverse.cwiseProduct(error);
   Mahalanobis result;
   for (int i = 0; i < y.size(); ++i)
-    if (solver.eigenvalues()[i] > kNull) {
-      result.squared += y[i] * y[i] / solver.eigenvalues()[i];
+    if (eigen.values[i] > kNull) {
+      result.squared += y[i] * y[i] / eigen.values[i];
       ++result.rank;
     }
   return result;

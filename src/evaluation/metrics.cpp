@@ -1,4 +1,6 @@
 #include <holdfast/evaluation/metrics.h>
+
+#include "geometry/symmetric_eigen.h"
 #include <holdfast/geometry/gaussian.h>
 #include <holdfast/geometry/rotation.h>
 
@@ -164,13 +166,12 @@ std::vector<PrincipalDeviation>
 principalDeviations(PatchType type, const ParameterMatrix& covariance)
 {
   requireSize(type, covariance);
-  const Eigen::SelfAdjointEigenSolver<ParameterMatrix> solver(symmetrized(covariance));
+  const SymmetricEigen eigen = symmetricEigen(symmetrized(covariance));
   const std::vector<std::string> names = parameterNames(type);
   std::vector<PrincipalDeviation> deviations;
   for (Eigen::Index i = covariance.rows() - 1; i >= 0; --i) // eigenvalues ascend
-    deviations.push_back(principalDeviation(solver.eigenvalues()[i],
-                                            solver.eigenvectors().col(i),
-                                            names));
+    deviations.push_back(
+        principalDeviation(eigen.values[i], eigen.vectors.col(i), names));
   return deviations;
 }
 

@@ -1,7 +1,8 @@
 #include "discrimination.h"
 
+#include "geometry/symmetric.h"
+
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 
 #include <boost/math/distributions/chi_squared.hpp>
 
@@ -58,12 +59,8 @@ discriminate(const Eigen::Vector3d& k,
              const DiscriminationThresholds& thresholds,
              const FitOptions& options)
 {
-  Eigen::Matrix2d K;
-  K << k[0], k[1], k[1], k[2];
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(K);
-  const Eigen::Vector2d values = solver.eigenvalues();
-  const int smaller = std::abs(values[0]) <= std::abs(values[1]) ? 0 : 1;
-  const double k_min = values[smaller], k_max = values[1 - smaller];
+  const symmetric::PlaneAxes axes = symmetric::planeAxes(k[0], k[1], k[2]);
+  const double k_min = axes.smaller, k_max = axes.larger;
   const double tolerance = options.curvature_tolerance_per_m;
   if (!options.statistical_discrimination)
     return discriminateByThreshold(k_min, k_max, tolerance);
@@ -75,7 +72,7 @@ discriminate(const Eigen::Vector3d& k,
   M << 1.0, 0.0, -1.0, 0.0, 2.0, 0.0;
   const double circular =
       mahalanobisSquared<2>(M * k, M * C * M.transpose()) / thresholds.circular;
-  const Eigen::Vector2d axis = solver.eigenvectors().col(smaller);
+  const Eigen::Vector2d& axis = axes.along_smaller;
   const Eigen::Vector3d a(axis.x() * axis.x(),
                           2.0 * axis.x() * axis.y(),
                           axis.y() * axis.y());

@@ -71,11 +71,12 @@ packed(int row, int column, int n)
   return row * n - row * (row - 1) / 2 + column - row;
 }
 
-/// What accumulateCovariance() needs of errors that points share (fit/pattern.h).
+/// Points that share errors (fit/pattern.h).
 struct PatternPoints {
+  const double* pixel[2]; ///< u, v
   const double* direction[3]; ///< r_i, how point i moves with its shared error
   const double* extra; ///< variance along r_i that the sums count beside Sigma_i
-  double* response; ///< out: X_i r_i, kMaxTheta rows of padded_size
+  double* response; ///< X_i r_i, kMaxTheta rows of padded_size, of the covariance pass
 };
 
 /// Where the points are: channels in the order of PointBatch::Channel.
@@ -138,8 +139,8 @@ struct CovarianceSums {
   double qqS[6][6]; ///< sum qt_a qt_b (Sigma_i)_cd
 };
 
-/// How many points from the first on are surely valid: finite coordinates and a
-/// positive definite covariance. The next ones need a closer look.
+/// How many points from the first on are surely valid: finite coordinates, pixels and
+/// directions, and a positive definite covariance. The next ones need a closer look.
 int countLeadingValid(const Points& points);
 
 namespace reference {
@@ -172,6 +173,22 @@ struct PlacedPoints {
   double* variance;
 };
 
+/// Where the pixels of the points are, padding left out of the sums.
+struct PixelSums {
+  double low[2], high[2];
+  double sum[2]; ///< sums are of the distances from a given pixel
+  double squares[3]; ///< uu uv vv
+};
+
+/// How much the neighbours of a point add to its variance: `whole` where it has all of
+/// them, less at the edge of the support, which is an ellipse; `less` is taken off.
+struct NeighborVariance {
+  double middle[2];
+  double to_disc[3]; ///< lower triangle 00 10 11 that makes it the unit disc
+  double whole, less;
+  double edge; ///< how far inwards neighbours are missed, in radii of the disc
+};
+
 /// A square grid of cells, row by row, with kCellRow numbers each.
 inline constexpr int kCells = 8; ///< along a side; even
 inline constexpr int kCellRow = 16; ///< a multiple of every vector
@@ -179,6 +196,12 @@ struct CellSums {
   alignas(64) double y[kCells * kCells][kCellRow];
   /// Of two cells, by how many rows and columns they are apart.
   double covariance[kCells][kCells];
+};
+
+/// Where in the image the cells are.
+struct CellGrid {
+  double corner[2];
+  double inverse_side;
 };
 
 /// Rows of as many numbers each, of small matrices whose size is known at run time.
@@ -247,6 +270,24 @@ struct Kernel {
                    const PatchForm& patch,
                    double curvature,
                    double* inverse_depth);
+
+  /// Extent and moments of the pixels of points that share errors.
+  void (*accumulatePixels)(const Points& points,
+                           const double about[2],
+                           PixelSums& sums);
+
+  /// Of every point that shares errors, padding included.
+  void (*neighborVariances)(const Points& points,
+                            const NeighborVariance& neighbors,
+                            double* out);
+
+  /// Adds y_i of every point that shares errors to the cell it is in: its response,
+  /// then r_i and the q_b r_c + q_c r_b of bc = xx xy xz yy yz zz, q from the mean, in
+  /// the axes of the batch.
+  void (*sumInCells)(const Points& points,
+                     const double mean[3],
+                     const CellGrid& grid,
+                     CellSums& cells);
 
   /// sum_bb' y_b C(b - b') y_b'^T over the cells of a grid, whose covariance depends on
   /// their distance in rows and columns alone.

@@ -32,4 +32,11 @@ store(Number x, double* p)
   hn::StoreU(x.v, kTag, p);
 }
 
+// Four numbers of each lane, one lane after the other.
+HWY_INLINE void
+storeByLane(const Number x[4], double* p)
+{
+  hn::StoreInterleaved4(x[0].v, x[1].v, x[2].v, x[3].v, kTag, p);
+}
+
 #include "kernel_operators.inl"

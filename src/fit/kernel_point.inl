@@ -7,6 +7,8 @@
 //   load(const double*)       kLanes consecutive doubles, aligned as those of a batch
 //   loadAnywhere(const double*)   the same, however they are aligned
 //   store(Number, double*)    the reverse
+//   storeByLane(const Number x[4], double*)
+//                             the same of four, lane by lane
 //   sumOfLanes(Number)        their sum
 //   sumsOfLanes(const Number*, double*)
 //                             those of kLanes Numbers
@@ -604,99 +606,7 @@ meetRays(const double* x,
   }
 }
 
-// ---- Sums over the cells of a grid
-// ---------------------------------------------------
-//
-// C does not change when both cells are mirrored, so that what is even about a middle
-// line of the grid and what is odd have no covariance: four sums over a quarter of the
-// cells, each with itself, in place of one over all pairs.
-
-constexpr int kHalf = kCells / 2;
-constexpr int kQuarter = kHalf * kHalf;
-constexpr int kRowNumbers = kCellRow / kLanes;
-
-// y of the quarter, even (sign 1) or odd (-1) about the middle row and column.
-HOLDFAST_INLINE void
-foldCells(const CellSums& cells,
-          double row_sign,
-          double column_sign,
-          double folded[kQuarter][kCellRow])
-{
-  for (int row = 0; row < kHalf; ++row)
-    for (int column = 0; column < kHalf; ++column) {
-      const int mirrored = kCells - 1 - column, below = kCells - 1 - row;
-      const double* at = cells.y[row * kCells + column];
-      const double* right = cells.y[row * kCells + mirrored];
-      const double* down = cells.y[below * kCells + column];
-      const double* across = cells.y[below * kCells + mirrored];
-      for (int i = 0; i < kCellRow; i += kLanes)
-        store(load(at + i) + load(right + i) * column_sign +
-                  (load(down + i) + load(across + i) * column_sign) * row_sign,
-              folded[row * kHalf + column] + i);
-    }
-}
-
-// Their covariance with each other: folded over the rows, then over the columns.
-inline void
-foldCovariance(const CellSums& cells,
-               double row_sign,
-               double column_sign,
-               double folded[kQuarter][kQuarter])
-{
-  for (int row = 0; row < kHalf; ++row)
-    for (int other_row = 0; other_row < kHalf; ++other_row) {
-      const double* near =
-          cells.covariance[row > other_row ? row - other_row : other_row - row];
-      const double* far = cells.covariance[kCells - 1 - row - other_row];
-      double C[kCells];
-      for (int across = 0; across < kCells; ++across)
-        C[across] = near[across] + row_sign * far[across];
-      for (int a = 0; a < kHalf; ++a)
-        for (int b = 0; b < kHalf; ++b)
-          folded[row * kHalf + a][other_row * kHalf + b] =
-              C[a > b ? a - b : b - a] + column_sign * C[kCells - 1 - a - b];
-    }
-}
-
-// sum_ab y_a C_ab y_b^T, a quarter of it (foldCells() counts y twice in each
-// direction).
-HOLDFAST_INLINE void
-addQuarter(const double y[kQuarter][kCellRow],
-           const double C[kQuarter][kQuarter],
-           Number sum[kCellRow][kRowNumbers])
-{
-  for (int a = 0; a < kQuarter; ++a) {
-    Number weighted[kRowNumbers];
-    for (int i = 0; i < kRowNumbers; ++i)
-      weighted[i] = Number(0.0);
-    for (int b = 0; b < kQuarter; ++b)
-      for (int i = 0; i < kRowNumbers; ++i)
-        weighted[i] = weighted[i] + load(y[b] + i * kLanes) * (0.25 * C[a][b]);
-    for (int row = 0; row < kCellRow; ++row)
-      for (int i = 0; i < kRowNumbers; ++i)
-        sum[row][i] = sum[row][i] + weighted[i] * y[a][row];
-  }
-}
-
-inline void
-sumOverCells(const CellSums& cells, double* out)
-{
-  Number sum[kCellRow][kRowNumbers];
-  for (auto& row : sum)
-    for (Number& entry : row)
-      entry = Number(0.0);
-  alignas(64) double y[kQuarter][kCellRow];
-  double C[kQuarter][kQuarter];
-  for (const double row_sign : {1.0, -1.0})
-    for (const double column_sign : {1.0, -1.0}) {
-      foldCells(cells, row_sign, column_sign, y);
-      foldCovariance(cells, row_sign, column_sign, C);
-      addQuarter(y, C, sum);
-    }
-  for (int row = 0; row < kCellRow; ++row)
-    for (int i = 0; i < kRowNumbers; ++i)
-      store(sum[row][i], out + row * kCellRow + i * kLanes);
-}
+#include "kernel_pattern.inl"
 
 // ---- Small matrices ---------------------------------------------------------------
 

@@ -32,6 +32,12 @@ store(double x, double* p)
   *p = x;
 }
 
+void
+storeByLane(const double x[4], double* p)
+{
+  std::copy_n(x, 4, p);
+}
+
 double
 sumOfLanes(double x)
 {

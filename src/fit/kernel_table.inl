@@ -14,6 +14,9 @@ makeKernel(const char* instruction_set)
           squaredResiduals,
           placePoints,
           meetRays,
+          accumulatePixels,
+          neighborVariances,
+          sumInCells,
           sumOverCells,
           congruence};
 }

@@ -3,9 +3,10 @@
 // compiler take every comparison with NaN for what it would be without. Included like
 // that file, after the same definitions.
 
-// How many points from the first on, in steps of kLanes, are surely valid: coordinates
-// finite and the covariance positive definite, by leading minors. NaN fails every
-// comparison, and what overflows is not below the limit.
+// How many points from the first on, in steps of kLanes, are surely valid: coordinates,
+// and what they share errors by, finite and the covariance positive definite, by
+// leading minors. NaN fails every comparison, and what overflows is not below the
+// limit.
 inline int
 leadingValid(const Points& points)
 {
@@ -17,7 +18,13 @@ leadingValid(const Points& points)
       q[k] = load(points.channel[k] + i);
     for (int k = 0; k < 6; ++k)
       S[k] = load(points.channel[3 + k] + i);
-    const Number sum = q[0] + q[1] + q[2];
+    Number sum = q[0] + q[1] + q[2];
+    if (points.pattern != nullptr) {
+      for (const double* pixel : points.pattern->pixel)
+        sum = sum + load(pixel + i);
+      for (const double* direction : points.pattern->direction)
+        sum = sum + load(direction + i);
+    }
     const Number minor = S[0] * S[3] - S[1] * S[1];
     const Number determinant = S[5] * minor + S[1] * S[2] * S[4] * 2.0 -
                                (S[0] * S[4] * S[4] + S[3] * S[2] * S[2]);

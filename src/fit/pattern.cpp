@@ -38,24 +38,41 @@ neighborSum(double length, double spacing)
 // edge reaches inwards, 1/sqrt(2 pi).
 constexpr double kReachOfEdge = 0.3989422804014327;
 
-// Share of its neighbours that a point has within a support whose edge it is `inside`
-// away from: a half at the edge, and as much less than all in the mean as a half-plane
-// lacks.
-double
-shareOfNeighbors(double inside, double reach)
-{
-  const double lack = std::max(0.0, 1.0 - inside / (6.0 * reach));
-  return 1.0 - 0.5 * lack * lack;
-}
+// At the edge a point has half of its neighbours, this many reaches inside all of them:
+// as much less in the mean as a half-plane lacks.
+constexpr double kEdgeInReaches = 6.0;
 
 // The mean of exp(-(x - x')^2 / (2 length^2)) over x and x' in intervals of length
-// `side` whose middles are `distance` apart; their difference, which is triangular, as
-// a Gaussian of the same variance.
-double
-meanOverCells(double length, double side, double distance)
+// `side`, whose middles are no, one, two and more sides apart; their difference, which
+// is triangular, as a Gaussian of the same variance.
+class CellMeans {
+public:
+  CellMeans(double length, double side)
+  {
+    const double spread = length * length + side * side / 6.0;
+    mean_ = length / std::sqrt(spread);
+    ratio_ = std::exp(-0.5 * side * side / spread);
+    change_ = ratio_ * ratio_;
+  }
+
+  double next()
+  {
+    const double mean = mean_;
+    mean_ *= ratio_; // exponents go by squares: 0, 1, 4, 9
+    ratio_ *= change_;
+    return mean;
+  }
+
+private:
+  double mean_, ratio_, change_;
+};
+
+kernel::Points
+withPattern(const PointBatch& batch, const kernel::PatternPoints& shared)
 {
-  const double spread = length * length + side * side / 6.0;
-  return length / std::sqrt(spread) * std::exp(-0.5 * distance * distance / spread);
+  kernel::Points points = kernelPoints(batch);
+  points.pattern = &shared;
+  return points;
 }
 
 // d[gradient | moments in the axes of R, over N] / d[gradient | sums of moments].
@@ -94,38 +111,33 @@ turned(const PatternMatrix& T, const PatternMatrix& Q)
 
 PatternSupport::PatternSupport(PointBatch& batch)
 {
-  const double* u = batch.channel(PointBatch::U);
-  const double* v = batch.channel(PointBatch::V);
   const int n = batch.size();
-  double high_u = -std::numeric_limits<double>::infinity(), high_v = high_u;
-  u0_ = v0_ = -high_u;
-  double su = 0.0, sv = 0.0, suu = 0.0, suv = 0.0, svv = 0.0;
-  const double at_u = u[0], at_v = v[0]; // near the others, to lose no digits
-  for (int i = 0; i < n; ++i) {
-    const double du = u[i] - at_u, dv = v[i] - at_v;
-    u0_ = std::min(u0_, u[i]), high_u = std::max(high_u, u[i]);
-    v0_ = std::min(v0_, v[i]), high_v = std::max(high_v, v[i]);
-    su += du, sv += dv;
-    suu += du * du, suv += du * dv, svv += dv * dv;
-  }
-  mean_ << at_u + su / n, at_v + sv / n;
+  const kernel::PatternPoints shared = kernelPattern(batch);
+  const kernel::Points points = withPattern(batch, shared);
+  const double near[2] = {shared.pixel[0][0], shared.pixel[1][0]}; // to lose no digits
+  kernel::PixelSums sums;
+  kernel::kernel().accumulatePixels(points, near, sums);
+  const double u = sums.sum[0] / n, v = sums.sum[1] / n;
+  mean_ << near[0] + u, near[1] + v;
   // A pixel is a square of side one, which also keeps rows of points from vanishing.
   constexpr double kPixelVariance = 1.0 / 12.0;
   Eigen::Matrix2d M;
-  M << suu / n - su / n * su / n + kPixelVariance, suv / n - su / n * sv / n,
-      suv / n - su / n * sv / n, svv / n - sv / n * sv / n + kPixelVariance;
+  M(0, 0) = sums.squares[0] / n - u * u + kPixelVariance;
+  M(0, 1) = M(1, 0) = sums.squares[1] / n - u * v;
+  M(1, 1) = sums.squares[2] / n - v * v + kPixelVariance;
   // The second moments of a uniform ellipse are a quarter of its semi-axes squared.
   constexpr double kPi = 3.14159265358979323846;
   const double root = std::sqrt(std::max(M.determinant(), 0.0));
   radius_px_ = 2.0 * std::sqrt(root);
   spacing_px_ = radius_px_ * std::sqrt(kPi / n);
   // Every point stands for a square about it.
-  const double extent = std::max(high_u - u0_, high_v - v0_) + spacing_px_;
-  u0_ = 0.5 * (u0_ + high_u - extent);
-  v0_ = 0.5 * (v0_ + high_v - extent);
+  const double extent =
+      std::max(sums.high[0] - sums.low[0], sums.high[1] - sums.low[1]) + spacing_px_;
+  u0_ = 0.5 * (sums.low[0] + sums.high[0] - extent);
+  v0_ = 0.5 * (sums.low[1] + sums.high[1] - extent);
   side_px_ = extent / kCells;
   to_disc_ = Eigen::Matrix2d(M.llt().matrixL()).inverse() * 0.5;
-  writeExtra(batch);
+  writeExtra(points, batch);
 }
 
 bool
@@ -135,7 +147,7 @@ PatternSupport::isShort(const CorrelatedNoise::Component& wave) const
 }
 
 void
-PatternSupport::writeExtra(PointBatch& batch) const
+PatternSupport::writeExtra(const kernel::Points& points, PointBatch& batch) const
 {
   double neighbors = 0.0, reach = 0.0, within_cell = 0.0;
   for (const CorrelatedNoise::Component& wave : batch.pattern()->components()) {
@@ -147,20 +159,18 @@ PatternSupport::writeExtra(PointBatch& batch) const
     else {
       // The sum over pairs of cells holds every point with itself, as if it were
       // anywhere in the cell.
-      const double mean = meanOverCells(wave.length_px, side_px_, 0.0);
+      const double mean = CellMeans(wave.length_px, side_px_).next();
       within_cell += wave.variance * mean * mean;
     }
   }
   reach /= std::max(neighbors, std::numeric_limits<double>::min());
-  const double* u = batch.channel(PointBatch::U);
-  const double* v = batch.channel(PointBatch::V);
-  double* extra = batch.channel(PointBatch::EXTRA);
-  for (int i = 0; i < batch.size(); ++i) {
-    const Eigen::Vector2d on_disc = to_disc_ * (Eigen::Vector2d(u[i], v[i]) - mean_);
-    const double inside = std::max(0.0, 1.0 - on_disc.norm()) * radius_px_;
-    const double share = reach > 0.0 ? shareOfNeighbors(inside, reach) : 1.0;
-    extra[i] = neighbors * share - within_cell;
-  }
+  kernel::kernel().neighborVariances(points,
+                                     {{mean_[0], mean_[1]},
+                                      {to_disc_(0, 0), to_disc_(1, 0), to_disc_(1, 1)},
+                                      neighbors,
+                                      within_cell,
+                                      kEdgeInReaches * reach / radius_px_},
+                                     batch.channel(PointBatch::EXTRA));
 }
 
 void
@@ -173,8 +183,9 @@ PatternSupport::writeCovariance(const CorrelatedNoise& noise,
     if (isShort(wave))
       continue;
     double along[kCells];
-    for (int d = 0; d < kCells; ++d)
-      along[d] = meanOverCells(wave.length_px, side_px_, d * side_px_);
+    CellMeans means(wave.length_px, side_px_);
+    for (double& mean : along)
+      mean = means.next();
     for (int down = 0; down < kCells; ++down)
       for (int across = 0; across < kCells; ++across)
         cells.covariance[down][across] += wave.variance * along[down] * along[across];
@@ -185,70 +196,22 @@ PatternMatrix
 PatternSupport::sum(const PointBatch& batch,
                     const Scatter& scatter,
                     const Eigen::Matrix3d& R,
-                    const double* response) const
+                    double* response) const
 {
+  kernel::PatternPoints shared = kernelPattern(batch);
+  shared.response = response;
   kernel::CellSums cells;
   for (auto& cell : cells.y)
     std::fill(std::begin(cell), std::end(cell), 0.0);
-  addResponses(batch, response, cells.y[0]);
-  addMoments(batch, scatter.mean, cells.y[0]);
+  kernel::kernel().sumInCells(withPattern(batch, shared),
+                              scatter.mean.data(),
+                              {{u0_, v0_}, 1.0 / side_px_},
+                              cells);
   writeCovariance(*batch.pattern(), cells);
-  Sum sum;
+  alignas(64) Sum sum;
   kernel::kernel().sumOverCells(cells, sum.data());
   return turned(turnOfMoments(R, batch.size()),
                 sum.topLeftCorner<kPatternTerms, kPatternTerms>());
-}
-
-int
-PatternSupport::cellOf(double u, double v) const
-{
-  // Written so that pixels beyond all reason are in some cell, too.
-  const auto cell = [this](double distance) {
-    const double cells = distance / side_px_;
-    return cells > 0.0 ? static_cast<int>(std::min(cells, kCells - 1.0)) : 0;
-  };
-  return cell(v - v0_) * kCells + cell(u - u0_);
-}
-
-void
-PatternSupport::addResponses(const PointBatch& batch,
-                             const double* response,
-                             double* cells) const
-{
-  const double* u = batch.channel(PointBatch::U);
-  const double* v = batch.channel(PointBatch::V);
-  const int padded = batch.paddedSize();
-  for (int i = 0; i < batch.size(); ++i) {
-    double* cell = cells + kCellRow * cellOf(u[i], v[i]);
-    for (int a = 0; a < kernel::kMaxTheta; ++a)
-      cell[a] += response[a * padded + i];
-  }
-}
-
-// sum r_i and sum of q_b r_c + q_c r_b, q from the mean; world axes.
-void
-PatternSupport::addMoments(const PointBatch& batch,
-                           const Eigen::Vector3d& mean,
-                           double* cells) const
-{
-  const double* u = batch.channel(PointBatch::U);
-  const double* v = batch.channel(PointBatch::V);
-  const double* const x[3] = {batch.channel(PointBatch::X),
-                              batch.channel(PointBatch::Y),
-                              batch.channel(PointBatch::Z)};
-  const double* const e[3] = {batch.channel(PointBatch::EX),
-                              batch.channel(PointBatch::EY),
-                              batch.channel(PointBatch::EZ)};
-  for (int i = 0; i < batch.size(); ++i) {
-    double* moment = cells + kCellRow * cellOf(u[i], v[i]) + kernel::kMaxTheta;
-    const double q[3] = {x[0][i] - mean[0], x[1][i] - mean[1], x[2][i] - mean[2]};
-    const double r[3] = {e[0][i], e[1][i], e[2][i]};
-    for (int b = 0, entry = 3; b < 3; ++b) {
-      moment[b] += r[b];
-      for (int c = b; c < 3; ++c, ++entry)
-        moment[entry] += q[b] * r[c] + q[c] * r[b];
-    }
-  }
 }
 
 } // namespace holdfast

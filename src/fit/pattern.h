@@ -18,6 +18,8 @@
 
 #include <Eigen/Core>
 
+#include <vector>
+
 namespace holdfast {
 
 struct Scatter;
@@ -26,6 +28,30 @@ struct Scatter;
 inline constexpr int kPatternTerms = kernel::kMaxTheta + 9;
 using PatternMatrix =
     Eigen::Matrix<double, kPatternTerms, kPatternTerms, Eigen::DontAlign>;
+
+/// Numbers of the points of a batch, as the kernel wants them; memory is kept between
+/// uses.
+class PaddedRows {
+public:
+  /// Zero.
+  void reset(int rows, int padded_size)
+  {
+    lines_per_row_ = static_cast<std::size_t>(padded_size / PointBatch::kLaneMultiple);
+    lines_.assign(static_cast<std::size_t>(rows) * lines_per_row_, {});
+  }
+
+  double* row(int i)
+  {
+    return lines_[static_cast<std::size_t>(i) * lines_per_row_].value;
+  }
+
+private:
+  struct alignas(64) Line {
+    double value[PointBatch::kLaneMultiple] = {};
+  };
+  std::vector<Line> lines_;
+  std::size_t lines_per_row_ = 0;
+};
 
 /// How the points of a patch lie in the image, and the cells over them.
 class PatternSupport {
@@ -42,19 +68,12 @@ public:
   PatternMatrix sum(const PointBatch& batch,
                     const Scatter& scatter,
                     const Eigen::Matrix3d& R,
-                    const double* response) const;
+                    double* response) const;
 
 private:
   bool isShort(const CorrelatedNoise::Component& wave) const;
-  int cellOf(double u, double v) const;
   void writeCovariance(const CorrelatedNoise& noise, kernel::CellSums& cells) const;
-  void addResponses(const PointBatch& batch,
-                    const double* response,
-                    double* cells) const;
-  void addMoments(const PointBatch& batch,
-                  const Eigen::Vector3d& mean,
-                  double* cells) const;
-  void writeExtra(PointBatch& batch) const;
+  void writeExtra(const kernel::Points& points, PointBatch& batch) const;
 
   double u0_ = 0.0, v0_ = 0.0; ///< corner of the grid, px
   double side_px_ = 1.0; ///< of a cell

@@ -159,10 +159,11 @@ int
 PointBatch::removeInvalid()
 {
   pad();
-  int start = std::min(size_, kernel::countLeadingValid(kernelPoints(*this)));
-  for (int i = 0; i < start && pattern_; ++i)
-    if (!hasFinitePattern(*this, i))
-      start = i;
+  kernel::Points points = kernelPoints(*this);
+  const kernel::PatternPoints shared = kernelPattern(*this);
+  if (pattern_)
+    points.pattern = &shared;
+  const int start = std::min(size_, kernel::countLeadingValid(points));
   int kept = start;
   for (int i = start; i < size_; ++i) {
     if (!isValid(*this, i))
@@ -229,8 +230,10 @@ PointBatch::pad()
     // Copies of a point stay within range of the surface; no covariance, no weight.
     std::fill(values + size_, values + padded, c < SXX ? values[size_ - 1] : 0.0);
   }
-  for (int c = EX; c <= EXTRA && pattern_; ++c)
-    std::fill_n(channel(static_cast<Channel>(c)) + size_, padded - size_, 0.0);
+  for (int c = U; c <= EXTRA && pattern_ && size_ > 0; ++c) {
+    double* values = channel(static_cast<Channel>(c));
+    std::fill(values + size_, values + padded, c < EX ? values[size_ - 1] : 0.0);
+  }
 }
 
 int

@@ -5,6 +5,7 @@
 #include "fit/models/models.h"
 #include "geometry/small_cholesky.h"
 #include "geometry/symmetric.h"
+#include "geometry/symmetric_eigen.h"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
@@ -161,13 +162,13 @@ NullSpace
 nullSpaceOf(const ThetaMatrix& H, Model model)
 {
   const Theta scale = unitScale(H, model);
-  const ThetaMatrix scaled = scale.asDiagonal() * H * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> solver(scaled);
+  const SymmetricEigen eigen =
+      symmetricEigen(scale.asDiagonal() * H * scale.asDiagonal());
   NullSpace space(6, 0);
   for (int i = 0; i < 6; ++i) {
-    if (solver.eigenvalues()[i] > kSmallestPivot)
+    if (eigen.values[i] > kSmallestPivot)
       break;
-    const Theta direction = scale.cwiseProduct(solver.eigenvectors().col(i));
+    const Theta direction = scale.cwiseProduct(eigen.vectors.col(i));
     space.conservativeResize(6, space.cols() + 1);
     space.col(space.cols() - 1) = direction.normalized();
   }
@@ -276,17 +277,10 @@ public:
     if (shared == nullptr || shared->variance() == 0.0)
       return;
     // Kept between patches: no allocation once they have seen the largest.
-    thread_local std::vector<double> response;
-    response.resize(static_cast<std::size_t>(kernel::kMaxTheta * points_.padded_size));
-    const PointBatch& batch = problem.batch;
-    pattern_ = {{batch.channel(PointBatch::EX),
-                 batch.channel(PointBatch::EY),
-                 batch.channel(PointBatch::EZ)},
-                batch.channel(PointBatch::EXTRA),
-                response.data()};
-    // Rows that the model does not have.
-    const int rows = kernel::parameterCount(problem.model);
-    std::fill(response.begin() + rows * points_.padded_size, response.end(), 0.0);
+    thread_local PaddedRows response;
+    response.reset(kernel::kMaxTheta, points_.padded_size);
+    pattern_ = kernelPattern(problem.batch);
+    pattern_.response = response.row(0);
     points_.pattern = &pattern_;
   }
 
@@ -345,11 +339,7 @@ private:
                   const UnboundedSurface& surface,
                   kernel::CovarianceSums& sums) const
   {
-    // What the points share is made of terms that all but cancel: single precision has
-    // cost a quarter of a variance.
-    const Precision precision =
-        points.pattern == nullptr ? problem_.precision : Precision::Double;
-    kernel::kernel().accumulateCovariance(precision,
+    kernel::kernel().accumulateCovariance(problem_.precision,
                                           problem_.model,
                                           problem_.residual,
                                           points,
@@ -361,6 +351,81 @@ private:
   kernel::Points points_;
   kernel::PatternPoints pattern_{};
 };
+
+// tr(H^-1 Cov(E_theta)): how much of chi2 the surface takes up on average.
+double
+takenUp(const Linearization& l, const ThetaMatrix& inverse)
+{
+  const ThetaMatrix gradient = l.XX + l.pattern.topLeftCorner<6, 6>();
+  return inverse.cwiseProduct(gradient).sum();
+}
+
+// Points moved onto a plane or paraboloid along the axis of its frame, where they
+// always meet it.
+void
+moveOnto(const UnboundedSurface& surface,
+         const kernel::Points& points,
+         double* const out[3])
+{
+  const Eigen::Vector3d k =
+      surface.model == Model::Plane ? Eigen::Vector3d::Zero() : surface.k;
+  for (int i = 0; i < points.padded_size; ++i) {
+    const Eigen::Vector3d point(points.channel[0][i],
+                                points.channel[1][i],
+                                points.channel[2][i]);
+    Eigen::Vector3d q = surface.R.transpose() * (point - surface.c);
+    q.z() = 0.5 * (k[0] * q.x() * q.x() + k[2] * q.y() * q.y()) + k[1] * q.x() * q.y();
+    const Eigen::Vector3d moved = surface.c + surface.R * q;
+    for (int axis = 0; axis < 3; ++axis)
+      out[axis][i] = moved[axis];
+  }
+}
+
+// The same at points without residuals.
+double
+takenUpWithoutResiduals(const SurfaceProblem& problem, const UnboundedSurface& surface)
+{
+  thread_local PaddedRows moved;
+  moved.reset(3, problem.points.padded_size);
+  double* const onto[3] = {moved.row(0), moved.row(1), moved.row(2)};
+  moveOnto(surface, problem.points, onto);
+  SurfaceProblem ideal = problem;
+  ideal.precision = Precision::Double; // what residuals do not determine is not much
+  std::copy_n(onto, 3, ideal.points.channel);
+  const CovariancePass pass(ideal);
+  kernel::CovarianceSums sums;
+  Linearization linearization;
+  pass.run(surface, sums);
+  linearize(surface, problem.scatter, sums, linearization);
+  pass.addPattern(surface, linearization);
+  return takenUp(linearization, symmetricInverse(linearization.H));
+}
+
+// Residuals of the size of the surface's own curvature reach into H and the X_i: chi2
+// would then be taken up by what is none of its mean, more of it than there is. It
+// shows where the Gauss-Newton part of H is not all of it, in units of the parameters'
+// sigmas.
+double
+meanTakenUp(const SurfaceProblem& problem, const SurfaceFit& fit)
+{
+  constexpr double kSmall = 0.1; // rms over the parameters
+  const Linearization& l = fit.linearization;
+  const ThetaMatrix inverse = symmetricInverse(l.H);
+  const ThetaMatrix rest = inverse.lazyProduct(fit.JtJ) - ThetaMatrix::Identity();
+  const double squared = rest.cwiseProduct(rest.transpose()).sum();
+  const bool is_quadric =
+      problem.model == Model::Paraboloid || problem.model == Model::Plane;
+  const double taken_up = takenUp(l, inverse);
+  if (!is_quadric || (squared < kernel::kMaxTheta * kSmall * kSmall &&
+                      taken_up < problem.scatter.count))
+    return taken_up;
+  // Which takes up too little of them, but never all.
+  constexpr double kLeastLeft = 0.5;
+  const double ideal = takenUpWithoutResiduals(problem, fit.surface);
+  const double left = problem.scatter.count - taken_up;
+  const double left_by_ideal = problem.scatter.count - ideal;
+  return left < kLeastLeft * left_by_ideal ? ideal : taken_up;
+}
 
 // Exact Newton steps; the sums of the last one also give the covariance. Newton is
 // blind to the cost: where it climbs away from the start, the start is kept.
@@ -398,6 +463,8 @@ polish(const SurfaceProblem& problem, const FitOptions& options, SurfaceFit& fit
       pass.addPattern(fit.surface, fit.linearization);
     if (arrived && options.separate_pattern)
       fit.white = pass.white(fit.surface);
+    if (arrived && fit.linearization.has_pattern)
+      fit.taken_up = meanTakenUp(problem, fit);
     fit.surface = retractedSurface(fit.surface, problem.scatter, step);
     if (arrived) {
       fit.status = FitStatus::Converged;
@@ -543,6 +610,17 @@ kernelPoints(const PointBatch& batch)
     points.channel[i] = batch.channel(static_cast<PointBatch::Channel>(i));
   points.padded_size = batch.paddedSize();
   return points;
+}
+
+kernel::PatternPoints
+kernelPattern(const PointBatch& batch)
+{
+  return {{batch.channel(PointBatch::U), batch.channel(PointBatch::V)},
+          {batch.channel(PointBatch::EX),
+           batch.channel(PointBatch::EY),
+           batch.channel(PointBatch::EZ)},
+          batch.channel(PointBatch::EXTRA),
+          nullptr};
 }
 
 kernel::State

@@ -46,6 +46,8 @@ struct SurfaceFit {
   Linearization linearization;
   /// The same with the errors alone that points do not share; when asked for.
   std::optional<Linearization> white;
+  /// Where points share errors: how much of chi2 the surface takes up on average.
+  double taken_up = 0.0;
   /// Undetermined directions of theta; no column unless Degenerate.
   NullSpace null_space = NullSpace(6, 0);
 };
@@ -103,6 +105,9 @@ ThetaMatrix thetaCovariance(const Linearization& linearization,
 
 /// The batch as the kernel sees it.
 kernel::Points kernelPoints(const PointBatch& batch);
+
+/// What its points share errors by, without responses.
+kernel::PatternPoints kernelPattern(const PointBatch& batch);
 
 /// The surface as the kernel sees it.
 kernel::State kernelState(const UnboundedSurface& surface, const Scatter& scatter);

@@ -59,4 +59,23 @@ planeTurn(double angle)
   return planeTurn(W);
 }
 
+// Principal axes of the symmetric matrix xx xy yy in a plane. Written out: Eigen's
+// solver costs every file that has one for this size seconds.
+struct PlaneAxes {
+  double smaller, larger; // eigenvalues by their magnitude
+  Eigen::Vector2d along_smaller; // unit
+};
+
+inline PlaneAxes
+planeAxes(double xx, double xy, double yy)
+{
+  const double mean = 0.5 * (xx + yy), half = 0.5 * (xx - yy);
+  const double radius = std::hypot(half, xy);
+  // Of the upper eigenvalue.
+  const double angle = 0.5 * std::atan2(xy, half);
+  const double c = std::cos(angle), s = std::sin(angle);
+  return mean < 0.0 ? PlaneAxes{mean + radius, mean - radius, {c, s}} :
+                      PlaneAxes{mean - radius, mean + radius, {-s, c}};
+}
+
 }} // namespace holdfast::symmetric

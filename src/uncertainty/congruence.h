@@ -31,6 +31,10 @@ public:
   {
     return v_[i][j];
   }
+  double operator()(int i, int j) const
+  {
+    return v_[i][j];
+  }
 
   /// J S J^T of this J and a symmetric S; Eigen's products of matrices whose size it
   /// does not know go entry by entry.

@@ -11,9 +11,6 @@
 #include <holdfast/geometry/rotation.h>
 #include <holdfast/uncertainty/monte_carlo.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -148,10 +145,10 @@ addPatternOfPlaneStage(const PatchFit& fit,
 {
   const Eigen::Matrix3d &R = fit.surface.surface.R, &Rp = fit.plane.surface.R;
   const int padded = batch.paddedSize(), room = kernel::kMaxTheta - terms.np;
-  thread_local std::vector<double> response;
+  thread_local PaddedRows response;
   for (int first = 0; first < terms.n; first += room) {
     const int rows = std::min(room, terms.n - first);
-    response.assign(static_cast<std::size_t>(kernel::kMaxTheta * padded), 0.0);
+    response.reset(kernel::kMaxTheta, padded);
     for (int i = 0; i < batch.size(); ++i) {
       const Eigen::Vector3d r = sharedDirection(batch, i);
       Eigen::Matrix<double, kernel::kMaxTheta, 1> y;
@@ -159,9 +156,9 @@ addPatternOfPlaneStage(const PatchFit& fit,
       y.segment(terms.np, rows) =
           terms.surface(i).middleRows(first, rows) * (R.transpose() * r);
       for (int a = 0; a < terms.np + rows; ++a)
-        response[static_cast<std::size_t>(a * padded + i)] = y[a];
+        response.row(a)[i] = y[a];
     }
-    const PatternMatrix sum = fit.support.sum(batch, fit.scatter, R, response.data());
+    const PatternMatrix sum = fit.support.sum(batch, fit.scatter, R, response.row(0));
     sums.with_surface.block(0, first, terms.np, rows) +=
         sum.block(0, terms.np, terms.np, rows);
     if (first == 0)
@@ -218,9 +215,13 @@ planeStageCovariance(const PatchFit& fit,
   ByTheta F_plane = ByTheta::Zero(G.rows(), 6);
   F_plane.leftCols<3>() = F.middleCols<3>(JointLayout::kPlane);
   const ByTheta Gp = gain(F_plane, symmetricInverse(hessianOf(fit.plane, mode)));
-  const ParameterMatrix cross =
-      Gp * (sums.with_surface * G.transpose() + sums.with_moments * M.transpose());
-  return symmetrized(ParameterMatrix(Gp * sums.own * Gp.transpose() + 2.0 * cross));
+  const ByTheta own = Gp.lazyProduct(sums.own);
+  const ByTheta with_surface = Gp.lazyProduct(sums.with_surface);
+  const ByMoments with_moments = Gp.lazyProduct(sums.with_moments);
+  ParameterMatrix result = own.lazyProduct(Gp.transpose());
+  result += 2.0 * with_surface.lazyProduct(G.transpose());
+  result += 2.0 * with_moments.lazyProduct(M.transpose());
+  return symmetrized(result);
 }
 
 // Covariance of what moves the estimate: X_i dq_i, then the moments (JointLayout).
@@ -229,24 +230,46 @@ noiseOf(const Linearization& l)
 {
   constexpr int kTheta = kernel::kMaxTheta;
   SmallRows C(kPatternTerms);
-  for (int i = 0; i < kPatternTerms; ++i)
-    for (int j = 0; j < kPatternTerms; ++j) {
-      const bool theta_i = i < kTheta, theta_j = j < kTheta;
-      C(i, j) = theta_i && theta_j ? l.XX(i, j) :
-                theta_i            ? l.XD(i, j - kTheta) :
-                theta_j            ? l.XD(j, i - kTheta) :
-                                     l.DD(i - kTheta, j - kTheta);
-      // What errors that points share add.
-      if (l.has_pattern)
-        C(i, j) += l.pattern(i, j);
-    }
+  for (int j = 0; j < kTheta; ++j)
+    for (int i = 0; i < kTheta; ++i)
+      C(i, j) = l.XX(i, j);
+  for (int j = 0; j < kMoments; ++j) {
+    for (int i = 0; i < kTheta; ++i)
+      C(i, kTheta + j) = C(kTheta + j, i) = l.XD(i, j);
+    for (int i = 0; i < kMoments; ++i)
+      C(kTheta + i, kTheta + j) = l.DD(i, j);
+  }
+  // What errors that points share add.
+  for (int j = 0; l.has_pattern && j < kPatternTerms; ++j)
+    for (int i = 0; i < kPatternTerms; ++i)
+      C(i, j) += l.pattern(i, j);
   return C;
+}
+
+struct FirstOrder {
+  ParameterMatrix covariance;
+  double cancellation = 1.0; ///< as PatchCovariance::cancellation
+};
+
+// Largest ratio of the variances that the errors alone would make of C to those of the
+// result of J C J^T.
+double
+cancellationIn(const SmallRows& J, const SmallRows& C, const ParameterMatrix& result)
+{
+  double largest = 1.0;
+  for (int i = 0; i < result.rows(); ++i) {
+    double terms = 0.0;
+    for (int k = 0; k < kPatternTerms; ++k)
+      terms += J(i, k) * J(i, k) * C(k, k);
+    largest = std::max(largest, terms / std::abs(result(i, i)));
+  }
+  return largest;
 }
 
 // Of what has the Jacobian F to the joint variables.
 // \param inverse of the Hessian
 // \param l of fit.surface, with all errors or some of them
-ParameterMatrix
+FirstOrder
 firstOrderCovariance(const PatchJacobian& F,
                      const ThetaMatrix& inverse,
                      const Linearization& l,
@@ -267,16 +290,21 @@ firstOrderCovariance(const PatchJacobian& F,
     for (int k = 0; k < 9; ++k)
       J(i, 6 + k) = M(i, k);
   }
-  auto covariance = J.congruence<ParameterMatrix>(noiseOf(l));
+  const SmallRows C = noiseOf(l);
+  FirstOrder result;
+  result.covariance = J.congruence<ParameterMatrix>(C);
+  if (l.has_pattern)
+    result.cancellation = cancellationIn(J, C, result.covariance);
   if (fit.has_plane_stage)
-    covariance +=
+    result.covariance +=
         planeStageCovariance(fit,
                              planeStageSums(fit, batch, options, l.has_pattern),
                              F,
                              G,
                              M,
                              mode);
-  return symmetrized(covariance);
+  result.covariance = symmetrized(result.covariance);
+  return result;
 }
 
 template <typename Jacobian>
@@ -291,31 +319,32 @@ JointMatrix
 jointCovariance(const PatchFit& fit, const PointBatch& batch, const FitOptions& options)
 {
   const Linearization& l = fit.surface.linearization;
-  const ThetaMatrix inverse = l.H.llt().solve(ThetaMatrix(ThetaMatrix::Identity()));
+  const ThetaMatrix inverse = symmetricInverse(l.H);
   JointMatrix joint = JointMatrix::Zero();
   joint.topLeftCorner<6, 6>() = thetaCovariance(l, l.H);
-  joint.block<6, 9>(0, JointLayout::kMean) = -inverse * (l.XD + l.A * l.DD);
+  const ThetaByMoments gradient = l.XD + l.A.lazyProduct(l.DD);
+  joint.block<6, 9>(0, JointLayout::kMean) = -inverse.lazyProduct(gradient);
   joint.block<9, 9>(JointLayout::kMean, JointLayout::kMean) = l.DD;
   if (l.has_pattern) {
     const auto with_moments = l.pattern.topRightCorner<6, 9>();
     const auto moments = l.pattern.bottomRightCorner<9, 9>();
-    joint.block<6, 9>(0, JointLayout::kMean) -=
-        inverse * (with_moments + l.A * moments);
+    const ThetaByMoments shared = with_moments + l.A.lazyProduct(moments);
+    joint.block<6, 9>(0, JointLayout::kMean) -= inverse.lazyProduct(shared);
     joint.block<9, 9>(JointLayout::kMean, JointLayout::kMean) += moments;
   }
   if (fit.has_plane_stage) {
     const Linearization& p = fit.plane.linearization;
     const PlaneStageSums sums = planeStageSums(fit, batch, options, l.has_pattern);
-    const ThetaMatrix plane = p.H.llt().solve(ThetaMatrix(ThetaMatrix::Identity()));
+    const ThetaMatrix plane = symmetricInverse(p.H);
     const ThetaMatrix own = plane * sums.own * plane;
-    const ThetaMatrix with_theta =
-        inverse *
-        (sums.with_surface.transpose() + l.A * sums.with_moments.transpose()) * plane;
+    const ThetaMatrix gradients =
+        sums.with_surface.transpose() + l.A.lazyProduct(sums.with_moments.transpose());
+    const ThetaMatrix with_theta = inverse * gradients * plane;
     joint.block<3, 3>(JointLayout::kPlane, JointLayout::kPlane) =
         own.topLeftCorner<3, 3>();
     joint.block<6, 3>(0, JointLayout::kPlane) = with_theta.leftCols<3>();
     joint.block<9, 3>(JointLayout::kMean, JointLayout::kPlane) =
-        -(plane * sums.with_moments).transpose().leftCols<3>();
+        -plane.lazyProduct(sums.with_moments).transpose().leftCols<3>();
   }
   joint.triangularView<Eigen::StrictlyLower>() = joint.transpose();
   // Padding of theta has no variance.
@@ -433,12 +462,9 @@ double
 expectedChi2(const PatchFit& fit)
 {
   const SurfaceFit& surface = fit.surface;
-  const Linearization& l = surface.linearization;
-  const int p = kernel::parameterCount(surface.surface.model);
-  if (!l.has_pattern)
-    return fit.points - p;
-  const ThetaMatrix gradient = l.XX + l.pattern.topLeftCorner<6, 6>();
-  return fit.points - symmetricInverse(l.H).cwiseProduct(gradient).sum();
+  return fit.points - (surface.linearization.has_pattern ?
+                           surface.taken_up :
+                           kernel::parameterCount(surface.surface.model));
 }
 
 FitStatus
@@ -524,6 +550,35 @@ asksForSecondOrder(const PatchFit& fit, const PatchCovariance& exact)
   return !first && axis <= kSecondOrderAngle && curvature >= kSecondOrderSigmas;
 }
 
+// tr(A^-1 B), A of unit diagonal. Where A is singular, B is with it, and both are what
+// rows that determine the others make them: eliminated from both by the largest pivots.
+double
+traceOfRatio(ParameterMatrix A, ParameterMatrix B)
+{
+  constexpr double kNull = 1e-12;
+  const int n = static_cast<int>(A.rows());
+  bool is_left[kMaxParameters];
+  std::fill_n(is_left, n, true);
+  double trace = 0.0;
+  for (int step = 0; step < n; ++step) {
+    int p = -1;
+    for (int i = 0; i < n; ++i)
+      if (is_left[i] && A(i, i) > (p < 0 ? kNull : A(p, p)))
+        p = i;
+    if (p < 0)
+      break;
+    is_left[p] = false;
+    trace += B(p, p) / A(p, p);
+    const ParameterVector share = A.col(p) / A(p, p), b = B.col(p);
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; is_left[i] && j < n; ++j) {
+        A(i, j) -= share[i] * share[j] * A(p, p);
+        B(i, j) -= share[i] * b[j] + b[i] * share[j] - share[i] * share[j] * b[p];
+      }
+  }
+  return trace;
+}
+
 void
 addSecondOrder(const PatchFit& fit,
                const PointBatch& batch,
@@ -540,8 +595,7 @@ addSecondOrder(const PatchFit& fit,
       scale.asDiagonal() * result.parameters * scale.asDiagonal();
   const ParameterMatrix second =
       scale.asDiagonal() * terms.covariance * scale.asDiagonal();
-  result.nonlinearity = first.completeOrthogonalDecomposition().solve(second).trace() /
-                        static_cast<double>(scale.size());
+  result.nonlinearity = traceOfRatio(first, second) / static_cast<double>(scale.size());
   result.parameters += terms.covariance;
   result.shift = terms.shift;
   result.state += terms.state_covariance;
@@ -573,11 +627,13 @@ patchCovariance(const PatchFit& fit,
                                 options,
                                 mode);
   };
-  const StateMatrix S = inAxes(fit.surface.linearization);
+  const FirstOrder first = inAxes(fit.surface.linearization);
+  const StateMatrix& S = first.covariance;
   const StateMatrix turn = stateByAxes(bounded.axes);
+  result.cancellation = first.cancellation;
   result.state = propagated(turn, S);
   if (fit.surface.white)
-    result.white_state = propagated(turn, inAxes(*fit.surface.white));
+    result.white_state = propagated(turn, inAxes(*fit.surface.white).covariance);
   result.parameters =
       mode == CovarianceMode::Stagewise ?
           stagewiseCovariance(fit, batch, options) :

@@ -17,6 +17,9 @@ struct PatchCovariance {
   ParameterMatrix parameters; ///< 0 x 0 when there is none
   StateVector state_shift; ///< likewise
   ParameterVector shift; ///< where second order was added, else empty
+  /// By how much the terms of a variance of the state may exceed it, where points share
+  /// errors: what moves all points alike moves a patch, but does not bend it.
+  double cancellation = 1.0;
   /// trace(S1^-1 C2)/dof of the parameters, C2 the second-order terms and S1 what the
   /// rest is; NaN where second order was not added.
   double nonlinearity = std::numeric_limits<double>::quiet_NaN();

@@ -1,6 +1,7 @@
 #include "second_order.h"
 
 #include "geometry/symmetric.h"
+#include "geometry/symmetric_eigen.h"
 #include <holdfast/geometry/gaussian.h>
 #include <holdfast/geometry/rotation.h>
 
@@ -87,14 +88,14 @@ secondOrderTerms(const PatchFit& fit,
   const Joint scale = joint.diagonal().cwiseMax(0.0).cwiseSqrt();
   const Joint inverse =
       scale.unaryExpr([](double s) { return s > 0.0 ? 1.0 / s : 0.0; });
-  const JointMatrix correlation = inverse.asDiagonal() * joint * inverse.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<JointMatrix> solver(correlation);
+  const SymmetricEigen eigen =
+      symmetricEigen(inverse.asDiagonal() * joint * inverse.asDiagonal());
   constexpr double kNull = 1e-9;
   std::vector<Joint> steps;
   for (int i = 0; i < JointLayout::kSize; ++i)
-    if (solver.eigenvalues()[i] > kNull)
-      steps.push_back(scale.cwiseProduct(std::sqrt(solver.eigenvalues()[i]) *
-                                         solver.eigenvectors().col(i)));
+    if (eigen.values[i] > kNull)
+      steps.push_back(
+          scale.cwiseProduct(std::sqrt(eigen.values[i]) * eigen.vectors.col(i)));
 
   const Output at = F(Joint::Zero());
   const int n = static_cast<int>(at.size()), m = static_cast<int>(steps.size());

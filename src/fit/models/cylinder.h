@@ -4,8 +4,8 @@
 #include "model.h"
 
 #include "geometry/safe_gap.h"
+#include "geometry/symmetric.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 
 #include <cmath>
@@ -122,16 +122,13 @@ private:
   // Turns the frame about z so that x is the direction of the smaller |curvature|.
   static void align(UnboundedSurface& surface)
   {
-    Eigen::Matrix2d K;
-    K << surface.k[0], surface.k[1], surface.k[1], surface.k[2];
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(K);
-    const Eigen::Vector2d values = solver.eigenvalues();
-    const int straight = std::abs(values[0]) < std::abs(values[1]) ? 0 : 1;
-    const Eigen::Vector2d x = solver.eigenvectors().col(straight);
+    const Eigen::Vector3d& k = surface.k;
+    const symmetric::PlaneAxes axes = symmetric::planeAxes(k[0], k[1], k[2]);
+    const Eigen::Vector2d& x = axes.along_smaller;
     Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
     turn.topLeftCorner<2, 2>() << x.x(), -x.y(), x.y(), x.x();
     surface.R = surface.R * turn;
-    surface.k = {values[1 - straight], 0.0, 0.0};
+    surface.k = {axes.larger, 0.0, 0.0};
   }
 };
 
