@@ -85,10 +85,10 @@ PatchEstimator::estimate(PointBatch& batch) const
 {
   const auto& [fitter, mode] = *impl_;
   const PatchFit fit = fitter.fit(batch);
-  const FitResult result = resultOf(fit, batch, fitter, mode);
-  return isWorthAllDigits(fit, result) ?
-             resultOf(fitter.refit(batch, fit), batch, fitter, mode) :
-             result;
+  FitResult result = resultOf(fit, batch, fitter, mode);
+  if (isWorthAllDigits(fit, result))
+    result = resultOf(fitter.refit(batch, fit), batch, fitter, mode);
+  return result;
 }
 
 FitResult

@@ -250,8 +250,8 @@ modeOf(const FitResult& fit, const ExtractionOptions& options)
 {
   if (options.covariance != CovarianceMode::Auto)
     return options.covariance;
-  return fit.mean_shift.size() > 0 ? CovarianceMode::SecondOrder :
-                                     CovarianceMode::Exact;
+  return fit.mean_shift->size() > 0 ? CovarianceMode::SecondOrder :
+                                      CovarianceMode::Exact;
 }
 
 void
@@ -340,13 +340,13 @@ addOrigin(const ExtractedPatch& extracted,
 void
 addParts(const FitResult& fit, io::JsonObject& json)
 {
-  if (fit.mean_shift.size() > 0) {
-    json.add("mean_shift", fit.mean_shift);
-    json.add("state_mean_shift", fit.state_mean_shift);
+  if (fit.mean_shift->size() > 0) {
+    json.add("mean_shift", *fit.mean_shift);
+    json.add("state_mean_shift", *fit.state_mean_shift);
   }
-  if (fit.white_state_covariance.size() > 0) {
-    const StateMatrix pattern = fit.state_covariance - fit.white_state_covariance;
-    json.addMatrix("state_covariance_white", fit.white_state_covariance);
+  if (fit.white_state_covariance->size() > 0) {
+    const StateMatrix pattern = fit.state_covariance - *fit.white_state_covariance;
+    json.addMatrix("state_covariance_white", *fit.white_state_covariance);
     json.addMatrix("state_covariance_pattern", pattern);
   }
 }
