@@ -260,6 +260,7 @@ deservesSecondAttempt(const ExtractedPatch& patch)
 /// Working memory of one thread.
 struct Workspace {
   std::vector<int> indices;
+  std::vector<int> first; ///< of a second attempt's patch, those of the first
   PointBatch batch;
 };
 
@@ -280,18 +281,18 @@ attemptAt(const Seed& seed,
   sites.search(seed, thread, work.indices);
   ExtractedPatch patch = fitted();
   if (sites.second_search && deservesSecondAttempt(patch)) {
-    std::vector<int> first = work.indices;
+    work.first = work.indices;
     sites.second_search(seed, thread, work.indices);
     // The same points would give the same patch.
     ExtractedPatch second;
-    if (work.indices != first)
+    if (work.indices != work.first)
       second = fitted();
     if (isAccepted(second)) {
       patch = std::move(second);
       patch.is_second_attempt = true;
     }
     else {
-      work.indices = std::move(first);
+      work.indices.swap(work.first);
     }
   }
   patch.seed_index = seed.index;
@@ -300,18 +301,20 @@ attemptAt(const Seed& seed,
 }
 
 /// One attempt per seed in their order, until the budget is spent.
+/// \param attempts whose memory is used, whatever they are of
 /// \param supports the points of each attempt, where they are asked for
-std::vector<ExtractedPatch>
+void
 attemptAll(const CompleteSites& sites,
            const PatchMaker& maker,
            const ExtractionOptions& options,
            SamplingBudget& budget,
+           std::vector<ExtractedPatch>& attempts,
            std::vector<std::vector<int>>& supports)
 {
   const bool keep_supports = options.max_overlap < 1.0;
   std::vector<Workspace> workspaces(
       static_cast<std::size_t>(threadCount(options.threads)));
-  std::vector<ExtractedPatch> attempts(sites.seeds.size());
+  attempts.resize(sites.seeds.size());
   // The points of attempts that wait to be looked at, where covered area counts.
   std::vector<std::vector<int>> covered(budget.limitsArea() ? attempts.size() : 0);
   supports.resize(keep_supports ? attempts.size() : 0);
@@ -341,7 +344,6 @@ attemptAll(const CompleteSites& sites,
               options.progress);
   attempts.resize(count.seen());
   supports.resize(keep_supports ? attempts.size() : 0);
-  return attempts;
 }
 
 /// True when all seeds are tried and the best patches are taken, since nothing but
@@ -393,7 +395,7 @@ sortOut(std::vector<ExtractedPatch> attempts,
     else if (!isAccepted(patch))
       ++result.turned_down[patch.validation->verdict];
   }
-  // In place: a patch with its covariance is some kilobytes.
+  // In place: a patch with its covariance is two kilobytes.
   const auto isUnwanted = [&](const ExtractedPatch& patch) {
     return !options.keep_failures && !isAccepted(patch) &&
            !(options.keep_turned_down && isUsable(patch.fit.status));
@@ -453,7 +455,8 @@ ExtractionResult
 extractPatches(const RangeCloud& cloud,
                const Sensor& sensor,
                const ExtractionOptions& options,
-               const PatchSites& asked)
+               const PatchSites& asked,
+               ExtractionResult former)
 {
   const auto start = SamplingBudget::Clock::now();
   requireValid(options);
@@ -468,8 +471,8 @@ extractPatches(const RangeCloud& cloud,
                                     options.sampler;
   SamplingBudget budget(limits, chosen.cloud.points->size(), start);
   std::vector<std::vector<int>> supports;
-  std::vector<ExtractedPatch> attempts =
-      attemptAll(sites, maker, options, budget, supports);
+  std::vector<ExtractedPatch> attempts = std::move(former.patches);
+  attemptAll(sites, maker, options, budget, attempts, supports);
   const bool all_tried = attempts.size() == sites.seeds.size();
   if (!asked.seeds)
     noteLimit(attempts.size(), sites.seeds.size(), result.notices);
