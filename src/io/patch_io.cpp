@@ -819,13 +819,13 @@ writeMesh(std::ostream& out,
     writeMeshBinary(out, mesh, in_double);
 }
 
+namespace {
+
 void
-writePatchPoints(std::ostream& out,
-                 const std::vector<ExtractedPatch>& patches,
-                 const Pose& sensor_pose,
-                 const Eigen::Vector3d& offset)
+writePatchCloud(std::ostream& out,
+                const pcl::PointCloud<PatchPoint>& cloud,
+                const Eigen::Vector3d& offset)
 {
-  const pcl::PointCloud<PatchPoint> cloud = toPatchCloud(patches, sensor_pose);
   pcl::PCLPointCloud2 fields;
   pcl::toPCLPointCloud2(cloud, fields);
   if (!offset.isZero(0.0))
@@ -834,6 +834,26 @@ writePatchPoints(std::ostream& out,
                        offset.y(),
                        offset.z());
   io::writePcdCompressed(out, fields, cloud.sensor_origin_, cloud.sensor_orientation_);
+}
+
+} // namespace
+
+void
+writePatchPoints(std::ostream& out,
+                 const std::vector<ExtractedPatch>& patches,
+                 const Pose& sensor_pose,
+                 const Eigen::Vector3d& offset)
+{
+  writePatchCloud(out, toPatchCloud(patches, sensor_pose), offset);
+}
+
+void
+writePatchPoints(std::ostream& out,
+                 const DenseExtraction& dense,
+                 const Pose& sensor_pose,
+                 const Eigen::Vector3d& offset)
+{
+  writePatchCloud(out, toPatchCloud(dense, sensor_pose), offset);
 }
 
 std::array<std::uint8_t, 3>
