@@ -5,6 +5,7 @@
 #include "support/random.h"
 
 #include <holdfast/pcl/frame_extraction.h>
+#include <holdfast/pcl/patch_estimation.h>
 
 #include <utility>
 
@@ -73,6 +74,26 @@ TEST_F(ExtractionAllocation, APatchOfAStreamTakesNoneFromTheSecondFrameOn)
       EXPECT_LT(test::allocations - before, kPerCall);
     }
   }
+}
+
+TEST_F(ExtractionAllocation, APatchOfTheFeatureTakesNoneFromTheSecondCloudOn)
+{
+  Random random;
+  PatchEstimation<pcl::PointXYZ, PatchPoint> estimation;
+  estimation.setSensor(makeSensor(kCamera));
+  estimation.setInputCloud(rollingCloud(random).points);
+  estimation.setSeedsFromSampler(true);
+  SamplerOptions sampler;
+  sampler.spacing_m = 0.02;
+  estimation.setSamplerOptions(sampler);
+  pcl::PointCloud<PatchPoint> patches;
+  estimation.compute(patches);
+  ASSERT_GT(patches.size(), 3 * kPerCall);
+  const std::size_t size = patches.size();
+  const long before = test::allocations;
+  estimation.compute(patches);
+  EXPECT_LT(test::allocations - before, kPerCall);
+  EXPECT_EQ(patches.size(), size);
 }
 
 /// The former result gives its memory, nothing else.

@@ -325,9 +325,13 @@ attemptAll(const CompleteSites& sites,
       budget.cover(points, projectedArea(attempts[i].fit.patch));
     return budget.isFull();
   });
+  // Once it is, the seeds that are left do not each ask what time it is.
+  std::atomic<bool> is_over{false};
   const auto attempt = [&](int item, int thread) {
-    if (count.isOver() || budget.isOutOfTime())
+    if (is_over || count.isOver() || budget.isOutOfTime()) {
+      is_over = true;
       return;
+    }
     const auto i = static_cast<std::size_t>(item);
     const Seed& seed = sites.seeds[i];
     Workspace& work = workspaces[static_cast<std::size_t>(thread)];
