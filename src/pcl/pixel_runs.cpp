@@ -77,20 +77,21 @@ PixelRuns::addRow(int row, PixelRange columns)
   char* const continues = continues_.data();
   const float* const first = value + columns.begin;
   const bool is_one = compareNeighbors(first, width, jump_.in_row, continues);
-  const auto endAfter = [=](int begin) {
-    if (is_one)
-      return width;
-    const void* const stop =
-        std::memchr(continues + begin + 1, 0, static_cast<std::size_t>(width - begin));
-    return static_cast<int>(static_cast<const char*>(stop) - continues);
-  };
   for (int begin = 0; begin < width;) {
-    const int end = endAfter(begin);
-    if (!std::isnan(first[begin]))
-      runs_.push_back({row,
-                       columns.begin + begin,
-                       columns.begin + end,
-                       static_cast<int>(runs_.size())});
+    if (std::isnan(first[begin])) { // it goes on nowhere, and is no run
+      ++begin;
+      continue;
+    }
+    int end = width;
+    if (!is_one) {
+      const auto left = static_cast<std::size_t>(width - begin);
+      const void* const stop = std::memchr(continues + begin + 1, 0, left);
+      end = static_cast<int>(static_cast<const char*>(stop) - continues);
+    }
+    runs_.push_back({row,
+                     columns.begin + begin,
+                     columns.begin + end,
+                     static_cast<int>(runs_.size())});
     begin = end;
   }
   joinRows(above_, here);
