@@ -91,11 +91,12 @@ PatchEstimator::estimate(PointBatch& batch) const
   const auto& [fitter, mode] = *impl_;
   const PatchFit fit = fitter.fit(batch);
   const PatchCovariance uncertainty = patchCovariance(fit, batch, fitter, mode);
-  const FitResult result = resultOf(fit, uncertainty);
-  if (!isWorthAllDigits(fit, uncertainty, result))
-    return result;
-  const PatchFit again = fitter.refit(batch, fit);
-  return resultOf(again, patchCovariance(again, batch, fitter, mode));
+  FitResult result = resultOf(fit, uncertainty);
+  if (isWorthAllDigits(fit, uncertainty, result)) {
+    const PatchFit again = fitter.refit(batch, fit);
+    result = resultOf(again, patchCovariance(again, batch, fitter, mode));
+  }
+  return result;
 }
 
 FitResult

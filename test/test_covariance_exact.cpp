@@ -199,7 +199,7 @@ TEST(CovarianceAuto, IsSecondOrderWhereOnlyThatTellsTheParameters)
     const auto axis_lost = [](const FitResult& fit) {
       return fit.flags.axis_not_observable || fit.flags.curvature_not_observable;
     };
-    const bool is_second = automatic.mean_shift.size() > 0;
+    const bool is_second = automatic.mean_shift->size() > 0;
     EXPECT_EQ(automatic.covariance, is_second ? second.covariance : exact.covariance);
     EXPECT_EQ(automatic.state_covariance,
               is_second ? second.state_covariance : exact.state_covariance);

@@ -1,76 +1,12 @@
 // A batch that is refilled and an estimator that is reused take no memory from the
 // heap: this program counts every allocation, its libraries' included.
+#include "support/count_allocations.h"
 #include "support/patch_batch.h"
 #include "support/random_patch.h"
 #include "support/spot.h"
 
 #include <holdfast/fusion/patch_map.h>
 #include <holdfast/patch_estimator.h>
-
-#include <atomic>
-#include <cerrno>
-#include <cstddef>
-#include <cstdlib>
-
-// A sanitizer puts its own functions before the C library's.
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-#define HOLDFAST_COUNTS_ALLOCATIONS 1
-#endif
-
-namespace {
-
-std::atomic<long> allocations{0};
-
-} // namespace
-
-#ifdef HOLDFAST_COUNTS_ALLOCATIONS
-
-extern "C" {
-
-void* __libc_malloc(std::size_t size);
-void* __libc_calloc(std::size_t count, std::size_t size);
-void* __libc_realloc(void* pointer, std::size_t size);
-void* __libc_memalign(std::size_t alignment, std::size_t size);
-
-// These stand before the C library's of the same name; `operator new` ends in them.
-void*
-malloc(std::size_t size)
-{
-  ++allocations;
-  return __libc_malloc(size);
-}
-
-void*
-calloc(std::size_t count, std::size_t size)
-{
-  ++allocations;
-  return __libc_calloc(count, size);
-}
-
-void*
-realloc(void* pointer, std::size_t size)
-{
-  ++allocations;
-  return __libc_realloc(pointer, size);
-}
-
-void*
-aligned_alloc(std::size_t alignment, std::size_t size)
-{
-  ++allocations;
-  return __libc_memalign(alignment, size);
-}
-
-int
-posix_memalign(void** pointer, std::size_t alignment, std::size_t size)
-{
-  ++allocations;
-  *pointer = __libc_memalign(alignment, size);
-  return *pointer ? 0 : ENOMEM;
-}
-}
-
-#endif
 
 namespace holdfast { namespace {
 
@@ -97,13 +33,13 @@ allocationsInSteadyState(const std::vector<test::Sample>& samples,
   int usable = 0;
   for (int round = 0; round < 4; ++round) {
     if (round == 1)
-      before = allocations;
+      before = test::allocations;
     for (const test::Sample& sample : samples) {
       test::fillBatch(sample, batch);
       usable += isUsable(estimator.estimate(batch).status);
     }
   }
-  const long count = allocations - before;
+  const long count = test::allocations - before;
   EXPECT_EQ(usable, 4 * static_cast<int>(samples.size()));
   return count;
 }
@@ -129,12 +65,12 @@ TEST_P(FitAllocation, NoneInSteadyState)
 
 TEST_P(FitAllocation, IsCounted)
 {
-  const long before = allocations;
+  const long before = test::allocations;
   // A direct call: compilers may leave out a pair of new and delete.
   ::operator delete(::operator new(10));
   PointBatch batch;
   batch.reserve(100);
-  EXPECT_EQ(allocations - before, 2);
+  EXPECT_EQ(test::allocations - before, 2);
 }
 
 // A map takes memory for births and seeds alone.

@@ -66,8 +66,8 @@ expectSound(const FitResult& result, const Sample& sample)
             static_cast<int>(sample.points.size()));
   EXPECT_LE(result.iterations, 2 * FitOptions{}.max_iterations);
   EXPECT_NE(statusName(result.status), "unknown");
-  EXPECT_TRUE(result.status == FitStatus::Degenerate || result.null_space.cols() == 0);
-  EXPECT_TRUE(result.null_space.allFinite());
+  EXPECT_TRUE(result.status == FitStatus::Degenerate || result.null_space->cols() == 0);
+  EXPECT_TRUE(result.null_space->allFinite());
   if (!isUsable(result.status)) {
     EXPECT_EQ(result.covariance.size(), 0);
     return;
@@ -202,7 +202,7 @@ TEST(FitDegenerate, PointsOnALineDetermineNoSurface)
     EXPECT_FALSE(isUsable(result.status)) << statusName(result.status);
     if (request == SurfaceRequest::Plane) {
       EXPECT_EQ(result.status, FitStatus::Degenerate);
-      EXPECT_EQ(result.null_space.cols(), 1); // the turn about the line
+      EXPECT_EQ(result.null_space->cols(), 1); // the turn about the line
     }
   };
   forEveryRequest(sampleOf(points), expectUndetermined);

@@ -9,7 +9,10 @@
 #include <nlohmann/json.hpp>
 
 #include <cmath>
+#include <cstring>
+#include <filesystem>
 #include <sstream>
+#include <utility>
 
 namespace holdfast { namespace {
 
@@ -101,6 +104,133 @@ TEST(FitProgram, FolderWritesJsonPointsAndMeshOfEveryCloud)
     EXPECT_EQ((*points.points)[i].getVector3fMap(),
               report.result.patches[i].fit.patch.c.cast<float>());
   EXPECT_LT(run.out.find("a.pcd: "), run.out.find("b.pcd: ")); // sorted, in the table
+}
+
+/// The numbers of a portable float map, row by row from the top.
+std::vector<float>
+readPfm(const std::string& path, int width, int height, int channels)
+{
+  const std::string bytes = test::readFile(path);
+  std::istringstream text(bytes);
+  std::string kind;
+  int columns = 0, rows = 0;
+  double order = 0.0;
+  text >> kind >> columns >> rows >> order;
+  EXPECT_EQ(kind, channels == 3 ? "PF" : "Pf");
+  EXPECT_EQ(columns, width);
+  EXPECT_EQ(rows, height);
+  const auto row = static_cast<std::size_t>(width * channels);
+  std::vector<float> values(row * static_cast<std::size_t>(height));
+  const auto first = static_cast<std::size_t>(text.tellg()) + 1;
+  EXPECT_EQ(bytes.size() - first, values.size() * sizeof(float));
+  for (std::size_t v = 0; v < static_cast<std::size_t>(height); ++v)
+    std::memcpy(values.data() + (static_cast<std::size_t>(height) - 1 - v) * row,
+                bytes.data() + first + v * row * sizeof(float),
+                row * sizeof(float));
+  return values;
+}
+
+const std::vector<std::string> kDenseFiles{"bowl.chi2_ratio.pfm",
+                                           "bowl.chi2_ratio.png",
+                                           "bowl.dense.pcd",
+                                           "bowl.kappa_max.pfm",
+                                           "bowl.kappa_max.png",
+                                           "bowl.kappa_min.pfm",
+                                           "bowl.kappa_min.png",
+                                           "bowl.normal.pfm",
+                                           "bowl.normal.png",
+                                           "bowl.sigma_normal.pfm",
+                                           "bowl.sigma_normal.png"};
+
+TEST(FitProgram, DenseWritesAnOrganizedCloudAndLayers)
+{
+  const std::string folder = freshFolder("fit_dense");
+  const std::string out = folder + "/out";
+  const auto run =
+      runProgram(folder,
+                 {"fit", saveBowl(folder, "bowl.pcd"), "--dense", "3", "-o", out});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(run.out.find("13 x 10 attempts, every 3 pixels"), std::string::npos);
+  EXPECT_EQ(test::filesIn(out), kDenseFiles);
+  const RangeCloud points = loadCloud(out + "/bowl.dense.pcd");
+  ASSERT_EQ(points.points->width, 13U);
+  ASSERT_EQ(points.points->height, 10U);
+  const auto normal = readPfm(out + "/bowl.normal.pfm", 13, 10, 3);
+  const auto low = readPfm(out + "/bowl.kappa_min.pfm", 13, 10, 1);
+  const auto high = readPfm(out + "/bowl.kappa_max.pfm", 13, 10, 1);
+  const auto sigma = readPfm(out + "/bowl.sigma_normal.pfm", 13, 10, 1);
+  const auto chi2 = readPfm(out + "/bowl.chi2_ratio.pfm", 13, 10, 1);
+  int patches = 0;
+  for (std::size_t i = 0; i < low.size(); ++i) {
+    const bool is_patch = !std::isnan((*points.points)[i].x);
+    patches += is_patch;
+    for (const float value : {normal[3 * i], low[i], high[i], sigma[i], chi2[i]})
+      EXPECT_EQ(std::isnan(value), !is_patch);
+    if (!is_patch)
+      continue;
+    EXPECT_LE(low[i], high[i]);
+    EXPECT_GT(sigma[i], 0.0F);
+    const Eigen::Vector3f n(normal[3 * i], normal[3 * i + 1], normal[3 * i + 2]);
+    EXPECT_NEAR(n.norm(), 1.0, 1e-5);
+    EXPECT_GT(n.dot(test::tiltedPose().c.cast<float>() -
+                    (*points.points)[i].getVector3fMap()),
+              0.0F);
+  }
+  EXPECT_GT(patches, 50);
+  EXPECT_EQ(test::readFile(out + "/bowl.normal.png").substr(1, 3), "PNG");
+}
+
+TEST(FitProgram, DenseIsRefusedWhereItMakesNoSense)
+{
+  const std::string folder = freshFolder("fit_dense_refused");
+  const std::string bowl = saveBowl(folder, "bowl.pcd");
+  const auto run = [&](const std::string& cloud, std::vector<std::string> more) {
+    std::vector<std::string> arguments{"fit", cloud, "-o", folder + "/out", "--dense"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return runProgram(folder, arguments);
+  };
+  for (const std::vector<std::string>& wrong : {std::vector<std::string>{"0"},
+                                                {"-3"},
+                                                {"some"},
+                                                {"3", "--whole"},
+                                                {"3", "--max-patches", "5"},
+                                                {"3", "--max-time", "1"},
+                                                {"3", "--seeds", "5"},
+                                                {"3", "--spacing", "0.1"},
+                                                {"3", "--no-overlap", "0.5"},
+                                                {"3", "--json", "-"}}) {
+    const auto refused = run(bowl, wrong);
+    EXPECT_EQ(refused.exit_code, 2) << wrong.back();
+  }
+  // Without an image, and with a stride beyond it.
+  RangeCloud cloud = loadCloud(bowl);
+  auto row = pcl::make_shared<pcl::PointCloud<pcl::PointXYZ>>(*cloud.points);
+  row->width *= row->height;
+  row->height = 1;
+  cloud.points = row;
+  saveCloud(folder + "/row.pcd", cloud);
+  for (const auto& [path, stride] :
+       {std::pair<std::string, std::string>{folder + "/row.pcd", "3"}, {bowl, "500"}}) {
+    const auto refused = run(path, {stride});
+    EXPECT_EQ(refused.exit_code, 1);
+    EXPECT_EQ(refused.errorLines(), 1) << refused.err;
+    EXPECT_NE(refused.err.find(path), std::string::npos);
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder + "/out"));
+}
+
+TEST(FitProgram, DenseFilesAppearTogetherOrNotAtAll)
+{
+  const std::string folder = freshFolder("fit_dense_atomic");
+  const std::string out = folder + "/out";
+  // A folder stands where a layer is to go.
+  std::filesystem::create_directories(out + "/bowl.sigma_normal.pfm");
+  const auto run =
+      runProgram(folder,
+                 {"fit", saveBowl(folder, "bowl.pcd"), "--dense", "5", "-o", out});
+  EXPECT_EQ(run.exit_code, 1);
+  EXPECT_NE(run.err.find("bowl.sigma_normal.pfm"), std::string::npos) << run.err;
+  EXPECT_EQ(test::filesIn(out), std::vector<std::string>{"bowl.sigma_normal.pfm"});
 }
 
 TEST(FitProgram, OneJsonObjectPerLineForSeveralClouds)

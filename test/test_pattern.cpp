@@ -233,10 +233,10 @@ TEST(Pattern, CanBeToldFromWhiteErrors)
               1e-9);
 
     const FitResult whole = estimatePatch(batch, FitOptions{});
-    EXPECT_EQ(whole.white_state_covariance.size(), 0);
+    EXPECT_EQ(whole.white_state_covariance->size(), 0);
     const FitResult apart = estimatePatch(batch, options);
     const Eigen::VectorXd total = apart.state_covariance.diagonal();
-    const Eigen::VectorXd own = apart.white_state_covariance.diagonal();
+    const Eigen::VectorXd own = apart.white_state_covariance->diagonal();
     EXPECT_TRUE((own.array() > 0.0).all() && (own.array() < total.array()).all());
   }
 }

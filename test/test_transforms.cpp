@@ -75,7 +75,7 @@ TEST_P(EveryType, BackAndForthIsWhereItWas)
   EXPECT_LT((pack(back.patch) - pack(fit.patch)).norm(), 1e-12);
   // Rounding, enlarged by charts near their singularity.
   EXPECT_LT(test::normalizedDifference(back.covariance, fit.covariance), 1e-9);
-  EXPECT_LT((back.mean_shift - fit.mean_shift).norm(), 1e-9 * fit.mean_shift.norm());
+  EXPECT_LT((*back.mean_shift - *fit.mean_shift).norm(), 1e-9 * fit.mean_shift->norm());
 }
 
 TEST_P(EveryType, PointsMoveAsTheirPatchesDo)

@@ -1,5 +1,6 @@
 #include "commands.h"
 #include "console.h"
+#include "dense_output.h"
 #include "fit_settings.h"
 #include "patch_output.h"
 #include "summary.h"
@@ -12,6 +13,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
 #include <map>
@@ -35,6 +37,8 @@ constexpr const char* kExamples = R"(Examples:
   holdfast fit floor.pcd --surface plane --boundary rectangle --seeds 200 \
       --seed-strategy poisson --random-seed 7
       at most 200 planes bounded by rectangles
+  holdfast fit depth.png --dense 4 -o results
+      a patch at every fourth pixel, as an organized cloud and as images
 
 Covariances of the points come from the field 'covariance' of a PCD (six floats xx xy xz
 yy yz zz, m^2), else from the sensor; the sensor's pose comes from VIEWPOINT. In the
@@ -57,7 +61,7 @@ public:
   void write(const PatchReport& report)
   {
     if (!settings_.output_folder.empty())
-      writeFiles(report);
+      writePatchFiles(report, settings_.output_folder, newStem(report.cloud));
     if (settings_.json_path == "-")
       writeJson(std::cout, report, JsonLayout::OneLine);
     else if (!settings_.quiet)
@@ -68,6 +72,14 @@ public:
     }
   }
 
+  void write(const DenseReport& report, double load_ms, double fit_ms)
+  {
+    if (!settings_.output_folder.empty())
+      writeDenseFiles(report, settings_.output_folder, newStem(report.cloud));
+    if (!settings_.quiet)
+      std::cout << denseSummary(report, load_ms, fit_ms) << std::flush;
+  }
+
   /// The JSON file appears only if a cloud has got into it.
   void finish()
   {
@@ -76,15 +88,16 @@ public:
   }
 
 private:
-  void writeFiles(const PatchReport& report)
+  /// The name of a cloud's results.
+  std::string newStem(const std::string& cloud)
   {
-    const std::string stem = fs::path(report.cloud).stem().string();
-    const auto [owner, is_new] = written_.emplace(stem, report.cloud);
+    const std::string stem = fs::path(cloud).stem().string();
+    const auto [owner, is_new] = written_.emplace(stem, cloud);
     if (!is_new)
       throw std::runtime_error(fmt::format("{}: its results would replace those of {}",
-                                           report.cloud,
+                                           cloud,
                                            owner->second));
-    writePatchFiles(report, settings_.output_folder, stem);
+    return stem;
   }
 
   const FitSettings& settings_;
@@ -95,14 +108,13 @@ private:
 
 /// \return true when every covariance of the cloud was one.
 bool
-checkCovariances(const PatchReport& report)
+checkCovariances(const std::string& cloud, const PointAccounting& points)
 {
-  const PointAccounting& points = report.result.points;
   if (points.invalid_covariance == 0)
     return true;
   const std::string what = fmt::format(
       "{}: {} of {} covariances are not finite or not positive semi-definite",
-      report.cloud,
+      cloud,
       points.invalid_covariance,
       points.valid());
   if (points.used == 0)
@@ -111,15 +123,12 @@ checkCovariances(const PatchReport& report)
   return false;
 }
 
-void
-checkPatches(const PatchReport& report)
+[[noreturn]] void
+failWithoutPatches(const std::string& cloud, const ExtractionResult& result)
 {
-  if (!report.result.patches.empty())
-    return;
-  const std::string rejected = rejectedText(report.result);
-  throw std::runtime_error(fmt::format("{}: no patch: {}",
-                                       report.cloud,
-                                       rejected.empty() ? "no seed" : rejected));
+  const std::string rejected = rejectedText(result);
+  throw std::runtime_error(
+      fmt::format("{}: no patch: {}", cloud, rejected.empty() ? "no seed" : rejected));
 }
 
 void
@@ -129,14 +138,24 @@ printNotices(const std::string& path, const std::vector<std::string>& notices)
     printNotice(path + ": " + notice);
 }
 
-ExtractionResult
-extract(const RangeCloud& cloud, const Sensor& sensor, const FitSettings& settings)
+/// Calls run() with the options, and shows how far it has come.
+template <typename Run>
+auto
+withProgress(const FitSettings& settings, Run&& run)
 {
   ProgressBar bar("fitting", !settings.quiet);
   ExtractionOptions options = settings.extraction.options;
   options.progress = [&bar](int done, int total) { bar.update(done, total); };
-  return settings.whole ? extractWhole(cloud, sensor, options) :
-                          extractPatches(cloud, sensor, options);
+  return run(options);
+}
+
+ExtractionResult
+extract(const RangeCloud& cloud, const Sensor& sensor, const FitSettings& settings)
+{
+  return withProgress(settings, [&](const ExtractionOptions& options) {
+    return settings.whole ? extractWhole(cloud, sensor, options) :
+                            extractPatches(cloud, sensor, options);
+  });
 }
 
 /// The cloud of a file with the sensor that took it, and what had to be decided.
@@ -163,6 +182,37 @@ loadInput(const std::string& path, const Sensor& nominal, const FitSettings& set
   return input;
 }
 
+/// From a cloud to an image of patches. \return as fitCloud().
+bool
+fitDense(const std::string& path,
+         const Input& input,
+         double load_ms,
+         const FitSettings& settings,
+         Output& output)
+{
+  const ExtractionOptions& wanted = settings.extraction.options;
+  if (const std::string error =
+          validityError(input.cloud, wanted, settings.dense_stride);
+      !error.empty())
+    throw std::runtime_error(path + ": " + error);
+  DenseReport report{path, input.cloud.sensor_pose, input.cloud.offset, {}};
+  const Stopwatch fitting;
+  report.dense = withProgress(settings, [&](const ExtractionOptions& options) {
+    return extractDense(input.cloud, input.sensor, options, settings.dense_stride);
+  });
+  const double fit_ms = fitting.milliseconds();
+  const ExtractionResult& result = report.dense.result;
+  if (!settings.quiet) {
+    printNotices(path, input.notices);
+    printNotices(path, result.notices);
+  }
+  const bool clean = checkCovariances(path, result.points);
+  if (std::none_of(result.patches.begin(), result.patches.end(), isAccepted))
+    failWithoutPatches(path, result);
+  output.write(report, load_ms, fit_ms);
+  return clean;
+}
+
 /// The road from a file to its patches.
 /// \return false when the results are written but some covariances of the cloud are
 /// none.
@@ -184,6 +234,8 @@ fitCloud(const std::string& path,
   report.offset = input.cloud.offset;
   report.covariances_of_cloud = input.cloud.hasCovariances();
   report.load_ms = loading.milliseconds();
+  if (settings.dense_stride > 0)
+    return fitDense(path, input, report.load_ms, settings, output);
 
   const Stopwatch fitting;
   report.result = extract(input.cloud, input.sensor, settings);
@@ -193,8 +245,9 @@ fitCloud(const std::string& path,
 
   if (!settings.quiet)
     printNotices(path, notices);
-  const bool clean = checkCovariances(report);
-  checkPatches(report);
+  const bool clean = checkCovariances(path, report.result.points);
+  if (report.result.patches.empty())
+    failWithoutPatches(path, report.result);
   output.write(report);
   return clean;
 }

@@ -7,6 +7,9 @@
 
 #include <CLI/CLI.hpp>
 
+#include <string>
+#include <vector>
+
 namespace holdfast::app {
 namespace {
 
@@ -68,6 +71,41 @@ addSeedOptions(CLI::App& command, SamplerOptions& sampler)
       ->group(group);
 }
 
+/// What takes the place of seeds all over the cloud.
+void
+addExtentOptions(CLI::App& command, FitSettings& settings)
+{
+  command.add_flag("--whole", settings.whole, "One patch to all points of the cloud")
+      ->group("Patches");
+  command
+      .add_option(
+          "--dense",
+          settings.dense_stride,
+          "A patch at every so many pixels of a depth image or organized cloud, "
+          "across and down; -o writes an organized NAME.dense.pcd, and as images "
+          "(NAME.LAYER.pfm in floats, .png to look at) normal, kappa_min, "
+          "kappa_max (1/metre), sigma_normal (rad) and chi2_ratio")
+      ->check(CLI::Range(1, 65535, "STRIDE"))
+      ->type_name("")
+      ->group("Patches");
+}
+
+/// What says nothing where every pixel, or every so many pixels, is asked for.
+void
+excludeFromExtents(CLI::App& command)
+{
+  const std::vector<std::string> of_both{"--spacing",
+                                         "--seeds",
+                                         "--max-patches",
+                                         "--max-area",
+                                         "--max-time",
+                                         "--seed-strategy"};
+  exclude(command, "--whole", of_both);
+  exclude(command, "--whole", {"--dense", "--radius", "--neighborhood", "--k"});
+  exclude(command, "--dense", of_both);
+  exclude(command, "--dense", {"--random-seed", "--no-overlap", "--accept", "--json"});
+}
+
 void
 addOutputOptions(CLI::App& command, FitSettings& settings)
 {
@@ -92,22 +130,11 @@ addFitOptions(CLI::App& command, FitSettings& settings)
 {
   addInputOptions(command, settings.input);
   addSurveyOptions(command, settings);
-  command.add_flag("--whole", settings.whole, "One patch to all points of the cloud")
-      ->group("Patches");
+  addExtentOptions(command, settings);
   addExtractionOptions(command, settings.extraction);
   addSeedOptions(command, settings.extraction.options.sampler);
   addOutputOptions(command, settings);
-  exclude(command,
-          "--whole",
-          {"--radius",
-           "--spacing",
-           "--seeds",
-           "--max-patches",
-           "--max-area",
-           "--max-time",
-           "--neighborhood",
-           "--k",
-           "--seed-strategy"});
+  excludeFromExtents(command);
   tidyHelp(command);
 }
 

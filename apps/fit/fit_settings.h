@@ -14,6 +14,7 @@ struct FitSettings {
   double sigma_m = 0.0; ///< 0: the noise of the sensor
   bool no_pattern = false;
   bool whole = false;
+  int dense_stride = 0; ///< px; 0: no image of patches
   ExtractionSettings extraction;
   std::string output_folder; ///< empty: no files
   std::string json_path; ///< empty: none; "-": standard output

@@ -23,6 +23,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace holdfast::app {
 namespace {
@@ -122,7 +123,7 @@ public:
   }
 
 private:
-  void write(const RangeFrame& frame, PatchReport& report);
+  void write(const RangeFrame& frame);
 
   const LiveSettings& settings_;
   Openni2Grabber& grabber_;
@@ -132,6 +133,7 @@ private:
   std::optional<JsonLines> json_;
   std::optional<PatchView> view_;
   LiveStatistics statistics_;
+  PatchReport report_; ///< of the last frame; its memory is used again
 };
 
 Sensor
@@ -166,26 +168,26 @@ LiveSession::process(const RangeFrame::ConstPtr& frame)
 {
   if (recording_)
     recording_->push(frame);
-  PatchReport report;
   const Stopwatch watch;
-  report.result = extractor_.extract(subtractPatternMap(frame->cloud, sensor_));
-  report.fit_ms = watch.milliseconds();
-  statistics_.addFrame(frame->received, report.result.patches);
+  report_.result = extractor_.extract(subtractPatternMap(frame->cloud, sensor_),
+                                      std::move(report_.result));
+  report_.fit_ms = watch.milliseconds();
+  statistics_.addFrame(frame->received, report_.result.patches);
   if (view_)
-    view_->put(frame, report.result.patches);
-  write(*frame, report);
+    view_->put(frame, report_.result.patches);
+  write(*frame);
 }
 
 void
-LiveSession::write(const RangeFrame& frame, PatchReport& report)
+LiveSession::write(const RangeFrame& frame)
 {
-  report.cloud = frameName(statistics_.frames());
-  report.timestamp_us = frame.timestamp_us;
-  report.options = settings_.extraction.options;
+  report_.cloud = frameName(statistics_.frames());
+  report_.timestamp_us = frame.timestamp_us;
+  report_.options = settings_.extraction.options;
   if (json_)
-    json_->write(report);
-  if (!settings_.output_folder.empty() && !report.result.patches.empty())
-    writePatchFiles(report, settings_.output_folder, report.cloud);
+    json_->write(report_);
+  if (!settings_.output_folder.empty() && !report_.result.patches.empty())
+    writePatchFiles(report_, settings_.output_folder, report_.cloud);
 }
 
 std::string

@@ -17,8 +17,8 @@ StateVector
 stateDifference(const FitResult& fit, const PatchState& reference)
 {
   StateVector error = -difference(reference, fit.state);
-  if (fit.state_mean_shift.size() > 0)
-    error += fit.state_mean_shift;
+  if (fit.state_mean_shift->size() > 0)
+    error += *fit.state_mean_shift;
   return error;
 }
 
@@ -81,9 +81,9 @@ tangentError(const Patch& patch, const Patch& reference)
 ParameterVector
 tangentShift(const FitResult& fit)
 {
-  if (fit.mean_shift.size() == 0)
+  if (fit.mean_shift->size() == 0)
     return ParameterVector::Zero(layoutOf(fit.patch.type).size());
-  return tangentJacobian(fit.patch) * fit.mean_shift;
+  return tangentJacobian(fit.patch) * *fit.mean_shift;
 }
 
 NormalizedError

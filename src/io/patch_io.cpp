@@ -250,8 +250,8 @@ modeOf(const FitResult& fit, const ExtractionOptions& options)
 {
   if (options.covariance != CovarianceMode::Auto)
     return options.covariance;
-  return fit.mean_shift.size() > 0 ? CovarianceMode::SecondOrder :
-                                     CovarianceMode::Exact;
+  return fit.mean_shift->size() > 0 ? CovarianceMode::SecondOrder :
+                                      CovarianceMode::Exact;
 }
 
 void
@@ -340,13 +340,13 @@ addOrigin(const ExtractedPatch& extracted,
 void
 addParts(const FitResult& fit, io::JsonObject& json)
 {
-  if (fit.mean_shift.size() > 0) {
-    json.add("mean_shift", fit.mean_shift);
-    json.add("state_mean_shift", fit.state_mean_shift);
+  if (fit.mean_shift->size() > 0) {
+    json.add("mean_shift", *fit.mean_shift);
+    json.add("state_mean_shift", *fit.state_mean_shift);
   }
-  if (fit.white_state_covariance.size() > 0) {
-    const StateMatrix pattern = fit.state_covariance - fit.white_state_covariance;
-    json.addMatrix("state_covariance_white", fit.white_state_covariance);
+  if (fit.white_state_covariance->size() > 0) {
+    const StateMatrix pattern = fit.state_covariance - *fit.white_state_covariance;
+    json.addMatrix("state_covariance_white", *fit.white_state_covariance);
     json.addMatrix("state_covariance_pattern", pattern);
   }
 }
@@ -846,13 +846,13 @@ writeMesh(std::ostream& out,
     writeMeshBinary(out, mesh, in_double);
 }
 
+namespace {
+
 void
-writePatchPoints(std::ostream& out,
-                 const std::vector<ExtractedPatch>& patches,
-                 const Pose& sensor_pose,
-                 const Eigen::Vector3d& offset)
+writePatchCloud(std::ostream& out,
+                const pcl::PointCloud<PatchPoint>& cloud,
+                const Eigen::Vector3d& offset)
 {
-  const pcl::PointCloud<PatchPoint> cloud = toPatchCloud(patches, sensor_pose);
   pcl::PCLPointCloud2 fields;
   pcl::toPCLPointCloud2(cloud, fields);
   if (!offset.isZero(0.0))
@@ -861,6 +861,26 @@ writePatchPoints(std::ostream& out,
                        offset.y(),
                        offset.z());
   io::writePcdCompressed(out, fields, cloud.sensor_origin_, cloud.sensor_orientation_);
+}
+
+} // namespace
+
+void
+writePatchPoints(std::ostream& out,
+                 const std::vector<ExtractedPatch>& patches,
+                 const Pose& sensor_pose,
+                 const Eigen::Vector3d& offset)
+{
+  writePatchCloud(out, toPatchCloud(patches, sensor_pose), offset);
+}
+
+void
+writePatchPoints(std::ostream& out,
+                 const DenseExtraction& dense,
+                 const Pose& sensor_pose,
+                 const Eigen::Vector3d& offset)
+{
+  writePatchCloud(out, toPatchCloud(dense, sensor_pose), offset);
 }
 
 std::array<std::uint8_t, 3>

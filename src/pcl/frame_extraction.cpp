@@ -75,7 +75,7 @@ FrameExtractor::restart(int width, int height)
 }
 
 ExtractionResult
-FrameExtractor::extract(const RangeCloud& frame)
+FrameExtractor::extract(const RangeCloud& frame, ExtractionResult former)
 {
   if (const std::string error = validityError(frame); !error.empty())
     throw std::invalid_argument(error);
@@ -85,8 +85,11 @@ FrameExtractor::extract(const RangeCloud& frame)
     throw std::invalid_argument("a frame must be an organized cloud");
   if (width != width_ || height != height_)
     restart(width, height);
-  ExtractionResult result =
-      extractPatches(frame, sensor_, options_, {seedsAt(frame, seeds_), {}, {}});
+  ExtractionResult result = extractPatches(frame,
+                                           sensor_,
+                                           options_,
+                                           {seedsAt(frame, seeds_), {}, {}},
+                                           std::move(former));
   putFailuresLast(result.patches, seeds_);
   result.patches = acceptedAmong(std::move(result.patches));
   return result;

@@ -102,6 +102,7 @@ struct NeighborhoodSampler::Impl {
   NoiseModel::ConstPtr noise;
   SamplerOptions options;
   std::optional<PixelGrid> grid;
+  std::vector<double> column_slopes; ///< x/z of the grid's columns
   std::optional<BallGrid> balls; ///< without a pixel grid
   pcl::KdTreeFLANN<pcl::PointXYZ> tree{false}; ///< for the nearest points
 };
@@ -130,6 +131,9 @@ NeighborhoodSampler::Impl::Impl(const RangeCloud& the_cloud,
   if (!noise)
     throw std::invalid_argument("the sensor has no noise model");
   grid = makePixelGrid(cloud, the_sensor);
+  if (grid)
+    for (int u = 0; u < grid->camera.width; ++u)
+      column_slopes.push_back((u - grid->camera.cx) / grid->camera.fx);
   const bool nearest = options.neighborhood == Neighborhood::Knn;
   if (!grid && !nearest)
     balls.emplace(points, validPoints(), options.radius_m);
@@ -563,12 +567,14 @@ NeighborhoodSampler::Impl::strayShare(int seed, const Patch& patch) const
   // Kept between patches: no allocation once it has seen the largest window.
   thread_local PatchRays rays;
   rays.clear();
+  const int first = window.columns.begin + step / 2;
+  const int per_row = (window.columns.end - first + step - 1) / step;
   for (int v = window.rows.begin + step / 2; v < window.rows.end; v += step)
-    for (int u = window.columns.begin + step / 2; u < window.columns.end; u += step)
-      if (const float depth = grid->row(v)[u]; !std::isnan(depth))
-        rays.add((u - grid->camera.cx) / grid->camera.fx,
-                 (v - grid->camera.cy) / grid->camera.fy,
-                 1.0 / depth);
+    rays.addRow(column_slopes.data() + first,
+                (v - grid->camera.cy) / grid->camera.fy,
+                grid->row(v) + first,
+                step,
+                per_row);
   const double z = inCamera(seed).z();
   const double sigma = depthSigma(seed) / (z * z); // of 1/z
   return rays.strayShare(patch, cloud.sensor_pose, kSigmas * sigma);

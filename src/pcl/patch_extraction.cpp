@@ -273,6 +273,7 @@ deservesSecondAttempt(const ExtractedPatch& patch)
 /// Working memory of one thread.
 struct Workspace {
   std::vector<int> indices;
+  std::vector<int> first; ///< of a second attempt's patch, those of the first
   PointBatch batch;
 };
 
@@ -293,18 +294,18 @@ attemptAt(const Seed& seed,
   sites.search(seed, thread, work.indices);
   ExtractedPatch patch = fitted();
   if (sites.second_search && deservesSecondAttempt(patch)) {
-    std::vector<int> first = work.indices;
+    work.first = work.indices;
     sites.second_search(seed, thread, work.indices);
     // The same points would give the same patch.
     ExtractedPatch second;
-    if (work.indices != first)
+    if (work.indices != work.first)
       second = fitted();
     if (isAccepted(second)) {
       patch = std::move(second);
       patch.is_second_attempt = true;
     }
     else {
-      work.indices = std::move(first);
+      work.indices.swap(work.first);
     }
   }
   patch.seed_index = seed.index;
@@ -313,19 +314,21 @@ attemptAt(const Seed& seed,
 }
 
 /// One attempt per seed in their order, until the budget is spent.
+/// \param attempts whose memory is used, whatever they are of
 /// \param supports the points of each attempt, where they are asked for
-std::vector<ExtractedPatch>
+void
 attemptAll(const CompleteSites& sites,
            const PatchMaker& maker,
            const ExtractionOptions& options,
            const PatchObserver& observe,
            SamplingBudget& budget,
+           std::vector<ExtractedPatch>& attempts,
            std::vector<std::vector<int>>& supports)
 {
   const bool keep_supports = options.max_overlap < 1.0;
   std::vector<Workspace> workspaces(
       static_cast<std::size_t>(threadCount(options.threads)));
-  std::vector<ExtractedPatch> attempts(sites.seeds.size());
+  attempts.resize(sites.seeds.size());
   // The points of attempts that wait to be looked at, where covered area counts.
   std::vector<std::vector<int>> covered(budget.limitsArea() ? attempts.size() : 0);
   supports.resize(keep_supports ? attempts.size() : 0);
@@ -336,9 +339,13 @@ attemptAll(const CompleteSites& sites,
       budget.cover(points, projectedArea(attempts[i].fit.patch));
     return budget.isFull();
   });
+  // Once it is, the seeds that are left do not each ask what time it is.
+  std::atomic<bool> is_over{false};
   const auto attempt = [&](int item, int thread) {
-    if (count.isOver() || budget.isOutOfTime())
+    if (is_over || count.isOver() || budget.isOutOfTime()) {
+      is_over = true;
       return;
+    }
     const auto i = static_cast<std::size_t>(item);
     const Seed& seed = sites.seeds[i];
     Workspace& work = workspaces[static_cast<std::size_t>(thread)];
@@ -357,7 +364,6 @@ attemptAll(const CompleteSites& sites,
               options.progress);
   attempts.resize(count.seen());
   supports.resize(keep_supports ? attempts.size() : 0);
-  return attempts;
 }
 
 /// True when all seeds are tried and the best patches are taken, since nothing but
@@ -410,7 +416,7 @@ sortOut(std::vector<ExtractedPatch> attempts,
     else if (!isAccepted(patch))
       ++result.turned_down[patch.validation->verdict];
   }
-  // In place: a patch with its covariance is some kilobytes.
+  // In place: a patch with its covariance is two kilobytes.
   const auto isUnwanted = [&](const ExtractedPatch& patch) {
     return !options.keep_failures && !isAccepted(patch) &&
            !(options.keep_turned_down && isUsable(patch.fit.status));
@@ -471,7 +477,8 @@ ExtractionResult
 extractPatches(const RangeCloud& cloud,
                const Sensor& sensor,
                const ExtractionOptions& options,
-               const PatchSites& asked)
+               const PatchSites& asked,
+               ExtractionResult former)
 {
   const auto start = SamplingBudget::Clock::now();
   requireValid(options);
@@ -486,8 +493,8 @@ extractPatches(const RangeCloud& cloud,
                                     options.sampler;
   SamplingBudget budget(limits, chosen.cloud.points->size(), start);
   std::vector<std::vector<int>> supports;
-  std::vector<ExtractedPatch> attempts =
-      attemptAll(sites, maker, options, asked.observe, budget, supports);
+  std::vector<ExtractedPatch> attempts = std::move(former.patches);
+  attemptAll(sites, maker, options, asked.observe, budget, attempts, supports);
   const bool all_tried = attempts.size() == sites.seeds.size();
   if (!asked.seeds)
     noteLimit(attempts.size(), sites.seeds.size(), result.notices);

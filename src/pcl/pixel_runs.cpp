@@ -48,16 +48,21 @@ namespace {
 
 /// Whether a pixel goes on where the one before is; none does after the last. Without
 /// branches, so that several pixels are looked at at once; comparisons with NaN are
-/// false: an invalid pixel ends a run.
-void
+/// false: an invalid pixel ends a run. \return true when all go on.
+bool
 compareNeighbors(const float* __restrict value,
                  int width,
                  float jump,
                  char* __restrict continues)
 {
-  for (int i = 1; i < width; ++i)
-    continues[i] = std::abs(value[i] - value[i - 1]) < jump ? 1 : 0;
+  char all = 1;
+  for (int i = 1; i < width; ++i) {
+    const char goes_on = std::abs(value[i] - value[i - 1]) < jump ? 1 : 0;
+    continues[i] = goes_on;
+    all = static_cast<char>(all & goes_on);
+  }
   continues[width] = 0;
+  return all != 0;
 }
 
 } // namespace
@@ -71,16 +76,22 @@ PixelRuns::addRow(int row, PixelRange columns)
   continues_.resize(static_cast<std::size_t>(width) + 1);
   char* const continues = continues_.data();
   const float* const first = value + columns.begin;
-  compareNeighbors(first, width, jump_.in_row, continues);
+  const bool is_one = compareNeighbors(first, width, jump_.in_row, continues);
   for (int begin = 0; begin < width;) {
-    const void* const stop =
-        std::memchr(continues + begin + 1, 0, static_cast<std::size_t>(width - begin));
-    const int end = static_cast<int>(static_cast<const char*>(stop) - continues);
-    if (!std::isnan(first[begin]))
-      runs_.push_back({row,
-                       columns.begin + begin,
-                       columns.begin + end,
-                       static_cast<int>(runs_.size())});
+    if (std::isnan(first[begin])) { // it goes on nowhere, and is no run
+      ++begin;
+      continue;
+    }
+    int end = width;
+    if (!is_one) {
+      const auto left = static_cast<std::size_t>(width - begin);
+      const void* const stop = std::memchr(continues + begin + 1, 0, left);
+      end = static_cast<int>(static_cast<const char*>(stop) - continues);
+    }
+    runs_.push_back({row,
+                     columns.begin + begin,
+                     columns.begin + end,
+                     static_cast<int>(runs_.size())});
     begin = end;
   }
   joinRows(above_, here);

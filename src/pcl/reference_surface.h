@@ -102,11 +102,6 @@ public:
     return g.squaredNorm() - off * off - squared_radius_ * rho * rho;
   }
 
-  double squaredRadius() const
-  {
-    return squared_radius_;
-  }
-
   /// Slopes s between which rays of this t meet the tangent plane within the radius;
   /// first > second when none does. Endless where the plane is seen edge-on. Where the
   /// surface is a plane, no others are within the radius.

@@ -54,22 +54,39 @@ stepOver(std::size_t size)
 // LateralDisc::excess() along a row of pixels, in single precision.
 class RowTest {
 public:
-  RowTest(const ReferenceSurface& surface, const LateralDisc& within, double t)
+  RowTest(const ReferenceSurface& surface, double radius_m)
+  : h_(surface.coefficients())
+  , is_plane_(surface.isPlane())
+  , seed_ray_(surface.seedRay().cast<float>())
+  , point_(surface.point().cast<float>())
+  , normal_(surface.normal().cast<float>())
+  , squared_radius_(static_cast<float>(radius_m * radius_m))
+  {}
+
+  /// \param t slope of the row's rays from that of the seed's
+  void setRow(double t)
   {
     // 1/z = rho[0] + rho[1] s + rho[2] s^2.
-    const std::array<double, 6>& h = surface.coefficients();
-    rho_ = {static_cast<float>(h[0] + t * (h[2] + h[5] * t)),
-            static_cast<float>(h[1] + h[4] * t),
-            static_cast<float>(h[3])};
-    ray_ =
-        surface.seedRay().cast<float>() + Eigen::Vector2f(0.0F, static_cast<float>(t));
-    point_ = surface.point().cast<float>();
-    normal_ = surface.normal().cast<float>();
-    squared_radius_ = static_cast<float>(within.squaredRadius());
+    rho_ = {static_cast<float>(h_[0] + t * (h_[2] + h_[5] * t)),
+            static_cast<float>(h_[1] + h_[4] * t),
+            static_cast<float>(h_[3])};
+    ray_ = seed_ray_ + Eigen::Vector2f(0.0F, static_cast<float>(t));
   }
 
-  // For n pixels from slope `s` on. Without branches and with local copies, so that
-  // several pixels are looked at at once.
+  /// Departures of n pixels of the row from slope `s` on; NaN where they are no part of
+  /// the surface.
+  void run(const float* depth, float s, float pitch, float gate, int n, float* out)
+      const
+  {
+    if (is_plane_)
+      runOnPlane(depth, s, pitch, gate, n, out);
+    else
+      runOnQuadric(depth, s, pitch, gate, n, out);
+  }
+
+private:
+  // Without branches and with local copies, so that several pixels are looked at at
+  // once.
   void runOnPlane(const float* __restrict depth,
                   float s,
                   float pitch,
@@ -88,12 +105,12 @@ public:
   }
 
   // The same where the surface bends, and not all that the chord holds is within.
-  void run(const float* __restrict depth,
-           float s,
-           float pitch,
-           float gate,
-           int n,
-           float* __restrict out) const
+  void runOnQuadric(const float* __restrict depth,
+                    float s,
+                    float pitch,
+                    float gate,
+                    int n,
+                    float* __restrict out) const
   {
     constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
     const auto [h0, h1, h2] = rho_;
@@ -115,9 +132,10 @@ public:
     }
   }
 
-private:
-  std::array<float, 3> rho_;
-  Eigen::Vector2f ray_;
+  std::array<double, 6> h_;
+  bool is_plane_;
+  std::array<float, 3> rho_{};
+  Eigen::Vector2f seed_ray_, ray_;
   Eigen::Vector3f point_, normal_;
   float squared_radius_;
 };
@@ -161,7 +179,7 @@ public:
     const Camera& camera = grid_.camera;
     // Beyond the disc on the tangent plane, for the disc on the curved surface.
     constexpr double kMargin = 1.2;
-    const LateralDisc within(surface_, radius_m);
+    RowTest test(surface_, radius_m);
     const LateralDisc about(surface_, (surface_.isPlane() ? 1.0 : kMargin) * radius_m);
     const PixelWindow window = grid_.ballWindow(surface_.point(), kMargin * radius_m);
     const int columns = window.columns.end - window.columns.begin;
@@ -177,7 +195,7 @@ public:
     const auto gate = static_cast<float>(departure_m / (depth_ * depth_));
     for (int v = window.rows.begin; v < window.rows.end; ++v) {
       const PixelRange range = chord(about, v, window.columns);
-      writeDepartures(within,
+      writeDepartures(test,
                       v,
                       range,
                       gate,
@@ -231,7 +249,7 @@ private:
   }
 
   // By how much 1/z of the points leaves the surface; NaN where they are no part of it.
-  void writeDepartures(const LateralDisc& within,
+  void writeDepartures(RowTest& test,
                        int v,
                        const PixelRange& range,
                        float gate,
@@ -239,14 +257,13 @@ private:
   {
     const float t = static_cast<float>((v - v0_) / grid_.camera.fy);
     const float pitch = static_cast<float>(1.0 / grid_.camera.fx);
-    const RowTest test(surface_, within, t);
-    const auto run = surface_.isPlane() ? &RowTest::runOnPlane : &RowTest::run;
-    (test.*run)(grid_.row(v) + range.begin,
-                pitch * static_cast<float>(range.begin - u0_),
-                pitch,
-                gate,
-                range.end - range.begin,
-                out + range.begin);
+    test.setRow(t);
+    test.run(grid_.row(v) + range.begin,
+             pitch * static_cast<float>(range.begin - u0_),
+             pitch,
+             gate,
+             range.end - range.begin,
+             out + range.begin);
   }
 
   const PixelGrid& grid_;

@@ -87,10 +87,10 @@ moveState(const Pose& T, FitResult& moved)
   J.block<2, 2>(layout.nu(), layout.nu()) = W.topLeftCorner<2, 2>();
   J.bottomRightCorner<3, 3>() = T.R;
   moved.state_covariance = propagate(J, moved.state_covariance);
-  if (moved.white_state_covariance.size() > 0)
-    moved.white_state_covariance = propagate(J, moved.white_state_covariance);
-  if (moved.state_mean_shift.size() > 0)
-    moved.state_mean_shift = J * moved.state_mean_shift;
+  if (moved.white_state_covariance->size() > 0)
+    moved.white_state_covariance = propagate(J, *moved.white_state_covariance);
+  if (moved.state_mean_shift->size() > 0)
+    moved.state_mean_shift = StateVector(J * *moved.state_mean_shift);
 }
 
 } // namespace
@@ -116,8 +116,8 @@ transformed(const FitResult& fit, const Pose& T)
   const ParameterMatrix J = chart.solve(
       representationJacobian(fit.patch, moved.patch, T) * tangentJacobian(fit.patch));
   moved.covariance = propagate(J, fit.covariance);
-  if (fit.mean_shift.size() > 0)
-    moved.mean_shift = J * fit.mean_shift;
+  if (fit.mean_shift->size() > 0)
+    moved.mean_shift = ParameterVector(J * *fit.mean_shift);
   return moved;
 }
 

@@ -191,12 +191,14 @@ ViewCheck::dropUnseen(UnusedPoints& unused) const
 {
   const Frustum frustum(sensor_);
   const Pose to_camera = cloud_.sensor_pose.inverse();
+  const bool in_camera_frame = isIdentity(cloud_.sensor_pose);
   for (std::size_t i = 0; i < cloud_.points->size(); ++i) {
     const pcl::PointXYZ& p = (*cloud_.points)[i];
-    if (!pcl::isFinite(p))
-      continue;
-    const Eigen::Vector3d q = to_camera.toWorld(p.getVector3fMap().cast<double>());
-    if (!frustum.contains(q))
+    Eigen::Vector3d q = p.getVector3fMap().cast<double>();
+    if (!in_camera_frame)
+      q = to_camera.toWorld(q);
+    // Most points are seen, and those that are not finite are not.
+    if (!frustum.contains(q) && pcl::isFinite(p))
       unused.drop(i,
                   q.z() > 0.0 ? &PointAccounting::out_of_view :
                                 &PointAccounting::behind_camera);

@@ -1,6 +1,7 @@
 /// \file What a fit returns.
 #pragma once
 
+#include <holdfast/fit/rare_matrix.h>
 #include <holdfast/patch/parameters.h>
 #include <holdfast/patch/state.h>
 
@@ -73,7 +74,7 @@ struct FitResult {
   /// What of state_covariance errors make that points do not share: it averages over
   /// frames, while the rest, the pattern, does not as long as the camera stands still.
   /// 0 x 0 unless asked for (FitOptions::separate_pattern).
-  StateMatrix white_state_covariance;
+  RareMatrix<StateMatrix> white_state_covariance;
   /// Covariance of [d | k | r | c] (holdfast/patch/parameters.h); 0 x 0 when not
   /// usable. Where flags are set see observableCovariance().
   ParameterMatrix covariance;
@@ -85,8 +86,8 @@ struct FitResult {
   double nonlinearity = 0.0;
   /// By how much the mean of the estimate is off, to second order; empty unless the
   /// covariance was computed to second order. Not applied to the patch.
-  ParameterVector mean_shift;
-  StateVector state_mean_shift; ///< the same, of the state
+  RareMatrix<ParameterVector> mean_shift;
+  RareMatrix<StateVector> state_mean_shift; ///< the same, of the state
   /// Sum of squared residuals over the point covariances, and its degrees of freedom
   /// (points minus surface parameters).
   double chi2 = 0.0;
@@ -105,7 +106,7 @@ struct FitResult {
   int polish_steps = 0; ///< exact Newton steps at the end
   /// Directions the data do not determine; no column unless Degenerate, and none where
   /// the surface is determined, but not its bounds or its normal.
-  NullSpace null_space = NullSpace(6, 0);
+  RareMatrix<NullSpace> null_space;
 };
 
 /// The covariance of the parameters without the entries that the flags say nothing of:

@@ -3,6 +3,7 @@
 
 #include <holdfast/fusion/patch_map.h>
 #include <holdfast/io/cloud_io.h>
+#include <holdfast/pcl/dense_extraction.h>
 #include <holdfast/pcl/patch_extraction.h>
 
 #include <array>
@@ -70,6 +71,12 @@ void writeMesh(std::ostream& out,
 /// million.
 void writePatchPoints(std::ostream& out,
                       const std::vector<ExtractedPatch>& patches,
+                      const Pose& sensor_pose,
+                      const Eigen::Vector3d& offset = Eigen::Vector3d::Zero());
+
+/// The same of an image of attempts, as an organized cloud.
+void writePatchPoints(std::ostream& out,
+                      const DenseExtraction& dense,
                       const Pose& sensor_pose,
                       const Eigen::Vector3d& offset = Eigen::Vector3d::Zero());
 

@@ -25,9 +25,12 @@ public:
   /// Patches of the next frame; those of the old seeds come first. Without max_time_s
   /// the result depends on the frames so far alone. A frame of another size starts
   /// anew.
+  /// \param former as for extractPatches(): of the last frame, so that none takes
+  /// memory
+  ///        for its patches.
   /// \throw std::invalid_argument when the cloud is not organized, and as
   /// extractPatches().
-  ExtractionResult extract(const RangeCloud& frame);
+  ExtractionResult extract(const RangeCloud& frame, ExtractionResult former = {});
 
 private:
   void restart(int width, int height);

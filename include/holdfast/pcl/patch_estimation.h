@@ -196,6 +196,7 @@ private:
   bool fake_tree_ = false;
   Pose used_sensor_pose_; ///< during compute()
   ExtractionResult result_; ///< with one entry per seed
+  ExtractionResult former_; ///< whose memory the next one uses
 
 public:
   PCL_MAKE_ALIGNED_OPERATOR_NEW

@@ -122,12 +122,18 @@ std::vector<Seed> seedsAt(const RangeCloud& cloud, const std::vector<int>& indic
 /// noise means nothing: 1 mm in every direction is assumed, with a notice. Where of
 /// several hundred seeds none finds neighbours, the others are not tried, with a notice
 /// that says why.
+/// \param former a result that is done with: the memory of its patches is used again.
+///        From the second cloud of a size on, patches take none of their own:
+///
+///     result = extractPatches(cloud, sensor, options, {}, std::move(result));
+///
 /// \throw std::invalid_argument on options or clouds that make no sense. The sensor
 /// needs a noise model only where the cloud has no covariances.
 ExtractionResult extractPatches(const RangeCloud& cloud,
                                 const Sensor& sensor,
                                 const ExtractionOptions& options,
-                                const PatchSites& sites = {});
+                                const PatchSites& sites = {},
+                                ExtractionResult former = {});
 
 /// One patch fitted to all valid points of the cloud. `rejected` has one entry when it
 /// failed. \throw as extractPatches().

@@ -57,6 +57,7 @@ template <typename PointInT, typename PointOutT>
 bool
 PatchEstimation<PointInT, PointOutT>::initCompute()
 {
+  former_ = std::move(result_);
   result_ = {};
   if (!pcl::PCLBase<PointInT>::initCompute())
     return false;
@@ -146,8 +147,8 @@ PatchEstimation<PointInT, PointOutT>::sites() const
     indices.clear();
     if (!seed.position.allFinite())
       return;
-    pcl::Indices found;
-    std::vector<float> squared_distances;
+    thread_local pcl::Indices found;
+    thread_local std::vector<float> squared_distances;
     this->searchForNeighbors(seed.index, search_parameter_, found, squared_distances);
     indices.assign(found.begin(), found.end());
     std::sort(indices.begin(), indices.end());
@@ -166,7 +167,7 @@ PatchEstimation<PointInT, PointOutT>::extract()
   if (!samplesSeeds())
     options.sampler = withoutLimits(options.sampler);
   std::vector<std::string> notices = std::move(result_.notices);
-  result_ = extractPatches(cloud, sensor_, options, sites());
+  result_ = extractPatches(cloud, sensor_, options, sites(), std::move(former_));
   result_.notices.insert(result_.notices.begin(), notices.begin(), notices.end());
   used_sensor_pose_ = cloud.sensor_pose;
   if (!samplesSeeds())
