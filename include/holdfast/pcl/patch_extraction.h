@@ -105,9 +105,9 @@ struct PatchSites {
   NeighborhoodSearch second_search;
   /// Without `seeds`: these come first, and of those that the sampler finds the ones
   /// that `is_free` says yes to, if there is such a function.
-  std::vector<Seed> first_seeds;
-  std::function<bool(const Seed&)> is_free;
-  PatchObserver observe; ///< may be none
+  std::vector<Seed> first_seeds = {};
+  std::function<bool(const Seed&)> is_free = {};
+  PatchObserver observe = {}; ///< may be none
 };
 
 /// The points of the cloud as seeds.
