@@ -14,6 +14,7 @@ namespace holdfast::app {
 void addCalibrateCommand(CLI::App& app, int& exit_code);
 void addFitCommand(CLI::App& app, int& exit_code);
 void addInfoCommand(CLI::App& app, int& exit_code);
+void addMapCommand(CLI::App& app, int& exit_code);
 void addRenderCommand(CLI::App& app, int& exit_code);
 void addSimulateCommand(CLI::App& app, int& exit_code);
 

@@ -35,6 +35,8 @@ constexpr const char* kExamples = R"(Examples:
                                             and as a picture
   holdfast fit can.pcd --whole --surface cylinder --json -
                                             one patch to all points, as JSON
+  holdfast map frames/ --poses trajectory.txt -o map.json
+                                            patches of a moving camera, fused
   holdfast calibrate frames/ -o mine.yaml   how large is my camera's noise?
   holdfast experiment table1                are the covariances right?
 
@@ -69,6 +71,7 @@ run(int argc, char** argv)
   holdfast::app::addRecordCommand(app, exit_code);
 #endif
 #ifndef HOLDFAST_QUICKSTART
+  holdfast::app::addMapCommand(app, exit_code);
   holdfast::app::addRenderCommand(app, exit_code);
   holdfast::app::addCalibrateCommand(app, exit_code);
   holdfast::app::addSimulateCommand(app, exit_code);

@@ -2,7 +2,9 @@
 // heap: this program counts every allocation, its libraries' included.
 #include "support/patch_batch.h"
 #include "support/random_patch.h"
+#include "support/spot.h"
 
+#include <holdfast/fusion/patch_map.h>
 #include <holdfast/patch_estimator.h>
 
 #include <atomic>
@@ -133,6 +135,32 @@ TEST_P(FitAllocation, IsCounted)
   PointBatch batch;
   batch.reserve(100);
   EXPECT_EQ(allocations - before, 2);
+}
+
+// A map takes memory for births and seeds alone.
+TEST(MapAllocation, NoneInSteadyState)
+{
+#ifndef HOLDFAST_COUNTS_ALLOCATIONS
+  GTEST_SKIP() << "allocations cannot be counted under a sanitizer";
+#endif
+  Random random;
+  const PatchEstimator estimator(test::paraboloidOptions());
+  const SpotView view(test::reliefScene(),
+                      test::kinect(),
+                      test::randomView(random),
+                      Pose(),
+                      0.05,
+                      4);
+  PatchMap map;
+  std::vector<Measurement> measurements{*view.measure(estimator, random.engine())};
+  map.update(measurements);
+  const long before = allocations;
+  for (int frame = 0; frame < 10; ++frame) {
+    map.move(Pose(), 1e-8 * JetMatrix::Identity());
+    map.update(measurements);
+  }
+  EXPECT_EQ(allocations - before, 0);
+  EXPECT_EQ(map.patches().size(), 1u);
 }
 
 INSTANTIATE_TEST_SUITE_P(AllTypes,

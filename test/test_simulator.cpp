@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 
 namespace holdfast { namespace {
 
@@ -246,6 +247,34 @@ TEST(Scenes, NearestSurfaceHidesTheOthers)
   EXPECT_EQ(hit->index, 1);
   EXPECT_DOUBLE_EQ(hit->t, 2.5);
   EXPECT_FALSE(firstHit(scene, {0, 0, 0}, {1, 0, 0}).has_value());
+}
+
+TEST(Scenes, FirstHitIsTheNearestOfAllShapes)
+{
+  for (const char* name : {"rocks", "mix", "table", "boulder_field", "stairway"}) {
+    SCOPED_TRACE(name);
+    const Scene scene = makeScene(name);
+    test::Random random;
+    for (int i = 0; i < 3000; ++i) {
+      const Eigen::Vector3d origin(random.uniform(-2, 2),
+                                   random.uniform(-2, 2),
+                                   random.uniform(-0.1, 2));
+      const Eigen::Vector3d direction = random.uniform(0.1, 3.0) * random.unitVector();
+      std::optional<double> nearest;
+      for (const auto& shape : scene.shapes) {
+        const auto t = shape->intersect(origin, direction);
+        if (!t)
+          continue;
+        EXPECT_GE(*t, shape->nearestPossible(origin, direction));
+        nearest = nearest ? std::min(*nearest, *t) : *t;
+      }
+      const auto hit = firstHit(scene, origin, direction);
+      ASSERT_EQ(hit.has_value(), nearest.has_value());
+      if (hit) {
+        EXPECT_EQ(hit->t, *nearest);
+      }
+    }
+  }
 }
 
 TEST(Scenes, AllAreSeenFromTheDistanceAsked)

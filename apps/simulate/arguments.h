@@ -1,3 +1,4 @@
+/// \file What holdfast simulate was asked for.
 #pragma once
 
 #include <holdfast/simulation/simulator.h>

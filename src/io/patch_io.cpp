@@ -351,9 +351,33 @@ addParts(const FitResult& fit, io::JsonObject& json)
   }
 }
 
+/// What only patches of a map have.
+void
+addMapPatch(const MapPatch& patch, io::JsonObject& json)
+{
+  io::JsonObject map(json.member("map"));
+  map.add("id", patch.id);
+  map.add("views", patch.views);
+  map.add("independent_views", patch.epochs);
+  map.add("last_seen", patch.last_seen);
+  map.add("conflicts", patch.conflicts);
+  map.add("radius", patch.radius_m);
+  map.add("roughness", patch.roughness(0.0));
+  map.add("anchor_position", patch.anchor.c);
+  map.addMatrix("anchor_rotation", patch.anchor.R);
+  map.add("jet", patch.jet.value());
+  map.addMatrix("jet_covariance", patch.jet.covariance());
+  Eigen::Matrix<double, SupportGrid::kCells, 1> rows;
+  for (int i = 0; i < SupportGrid::kCells; ++i)
+    rows[i] = patch.support.rows()[static_cast<std::size_t>(i)];
+  map.add("support", rows);
+  map.end();
+}
+
 void
 appendPatch(const ExtractedPatch& extracted,
             const PatchReport& report,
+            std::size_t index,
             std::string& out)
 {
   io::JsonObject json(out);
@@ -361,6 +385,8 @@ appendPatch(const ExtractedPatch& extracted,
   addValidation(extracted.validation, json);
   addOrigin(extracted, report.offset, json);
   addParts(extracted.fit, json);
+  if (report.map)
+    addMapPatch(report.map->patches()[index], json);
   json.end();
 }
 
@@ -396,7 +422,7 @@ patchesText(const PatchReport& report,
   for (std::size_t i = begin; i < end; ++i) {
     if (i > 0)
       text += between;
-    appendPatch(report.result.patches[i], report, text);
+    appendPatch(report.result.patches[i], report, i, text);
   }
   return text;
 }

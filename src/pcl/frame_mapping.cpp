@@ -24,6 +24,13 @@ extractionFor(const MappingOptions& options)
   return extraction;
 }
 
+bool
+hasSizeOf(const RangeCloud& frame, const Camera& camera)
+{
+  return static_cast<int>(frame.points->width) == camera.width &&
+         static_cast<int>(frame.points->height) == camera.height;
+}
+
 int
 pixelIndex(const RangeCloud& frame, const Eigen::Vector2d& pixel)
 {
@@ -118,12 +125,21 @@ struct FrameMapper::Places {
   std::vector<std::uint64_t> seen_through;
 };
 
+void
+FrameMapper::matchSensor(const RangeCloud& frame)
+{
+  if (!matched_ || !hasSizeOf(frame, matched_->camera))
+    matched_ = matchedSensor(sensor_, frame);
+}
+
 FrameMapper::Places
 FrameMapper::placesIn(const RangeCloud& frame, const Pose& sensor, FrameReport& report)
 {
-  if (!camera_)
-    camera_ = matchedSensor(sensor_, frame).camera;
-  std::vector<WantedSeed> wanted = map_.wantedSeeds(*camera_, sensor);
+  Places places;
+  // A frame that does not tell its camera has next to no point.
+  if (!hasSizeOf(frame, matched_->camera))
+    return places;
+  std::vector<WantedSeed> wanted = map_.wantedSeeds(matched_->camera, sensor);
   // Those first that have waited longest, should the time not suffice for all.
   std::stable_sort(wanted.begin(),
                    wanted.end(),
@@ -131,12 +147,11 @@ FrameMapper::placesIn(const RangeCloud& frame, const Pose& sensor, FrameReport& 
                      return map_.find(a.patch)->last_seen <
                             map_.find(b.patch)->last_seen;
                    });
-  Places places;
   for (const WantedSeed& seed : wanted) {
     const int index = pixelIndex(frame, seed.pixel);
     const Eigen::Vector3d point = pointAt(frame, index);
     const Eigen::Vector3d q = frame.sensor_pose.toLocal(point);
-    switch (sightOf(seed, q.z(), depthSigma(sensor_, q))) {
+    switch (sightOf(seed, q.z(), depthSigma(*matched_, q))) {
     case Sight::Seen:
       places.seeds.push_back({index, point});
       places.asking.push_back(seed.patch);
@@ -160,6 +175,7 @@ FrameMapper::measure(const RangeCloud& frame, const Pose& sensor, FrameReport& r
     throw std::invalid_argument(error);
   if (frame.points->height < 2)
     throw std::invalid_argument("a frame must be an organized cloud");
+  matchSensor(frame);
   constexpr double kFree = 0.75; // of the spacing
   const double nearest =
       std::min(kFree * options_.extraction.sampler.spacing_m, options_.map.radius_m);
@@ -183,8 +199,7 @@ FrameMapper::measure(const RangeCloud& frame, const Pose& sensor, FrameReport& r
         const std::lock_guard<std::mutex> lock(mutex);
         measured.measurements.push_back(*m);
       };
-  report.extraction = extractPatches(frame, sensor_, options_.extraction, sites);
-  camera_ = report.extraction.sensor.camera;
+  report.extraction = extractPatches(frame, *matched_, options_.extraction, sites);
   report.measurements = static_cast<int>(measured.measurements.size());
   return measured;
 }

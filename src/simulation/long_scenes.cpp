@@ -55,8 +55,7 @@ makeBoulderField(Scene& scene, double distance)
   constexpr double kLength = 12.0, kWidth = 3.0;
   constexpr int kRocks = 170;
   const auto ground =
-      std::make_shared<Terrain>(Vector3d::Zero(), 20.0, 0.06, 1.2, std::uint64_t{21});
-  scene.shapes.push_back(ground);
+      std::make_shared<Terrain>(Vector3d::Zero(), 20.0, 0.05, 2.0, std::uint64_t{21});
   std::mt19937_64 generator(22);
   std::uint64_t seed = 100;
   for (const Spot& spot : scatter(kRocks, kLength, kWidth, generator)) {
@@ -69,6 +68,8 @@ makeBoulderField(Scene& scene, double distance)
                spot.radius * Vector3d(1.0, across, up),
                ++seed);
   }
+  // Last: it takes the longest, and is not looked for behind a rock.
+  scene.shapes.push_back(ground);
   scene.walk_start = {-6.5, 0.0, 0.0};
   placeSensor(scene, {0, 0, 0.05}, distance);
 }

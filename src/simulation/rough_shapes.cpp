@@ -4,6 +4,7 @@
 #include "ray.h"
 #include "sensor/require.h"
 
+#include <limits>
 #include <random>
 
 namespace holdfast {
@@ -21,17 +22,21 @@ randomDirection(bool planar, std::mt19937_64& generator)
   return {across * std::cos(angle), across * std::sin(angle), z};
 }
 
-/// Whether no part of a ray, t >= 0, lies in a ball around the origin.
-bool
-missesBall(const Eigen::Vector3d& origin,
-           const Eigen::Vector3d& direction,
-           double radius)
+/// Where a ray, t >= 0, comes into a ball around the origin; infinite: nowhere.
+double
+entryOfBall(const Eigen::Vector3d& origin,
+            const Eigen::Vector3d& direction,
+            double radius)
 {
   const double away = origin.squaredNorm() - radius * radius;
   if (away <= 0.0)
-    return false;
+    return 0.0;
   const double along = origin.dot(direction);
-  return along >= 0.0 || along * along < away * direction.squaredNorm();
+  const double d2 = direction.squaredNorm();
+  const double discriminant = along * along - away * d2;
+  if (along >= 0.0 || discriminant < 0.0)
+    return std::numeric_limits<double>::infinity();
+  return (-along - std::sqrt(discriminant)) / d2;
 }
 
 } // namespace
@@ -92,11 +97,7 @@ std::optional<double>
 Terrain::intersect(const Eigen::Vector3d& origin,
                    const Eigen::Vector3d& direction) const
 {
-  // The margin keeps flat ground from being a box without volume.
-  const Eigen::Vector3d half(0.5 * size_,
-                             0.5 * size_,
-                             bumps_.amplitude() + 1e-6 * size_);
-  auto inside = clipToBox(origin - center_, direction, half);
+  auto inside = clipToBox(origin - center_, direction, halfBox());
   if (!inside || inside->end < 0.0)
     return std::nullopt;
   inside->begin = std::max(inside->begin, 0.0);
@@ -107,6 +108,22 @@ Terrain::intersect(const Eigen::Vector3d& origin,
   const double max_slope =
       std::abs(direction.z()) + bumps_.maxSlope() * direction.head<2>().norm();
   return firstRoot(above, *inside, max_slope);
+}
+
+Eigen::Vector3d
+Terrain::halfBox() const
+{
+  // The margin keeps flat ground from being a box without volume.
+  return {0.5 * size_, 0.5 * size_, bumps_.amplitude() + 1e-6 * size_};
+}
+
+double
+Terrain::nearestPossible(const Eigen::Vector3d& origin,
+                         const Eigen::Vector3d& direction) const
+{
+  const auto inside = clipToBox(origin - center_, direction, halfBox());
+  return inside ? std::max(inside->begin, 0.0) :
+                  std::numeric_limits<double>::infinity();
 }
 
 std::string
@@ -163,7 +180,7 @@ Boulder::intersect(const Eigen::Vector3d& origin,
                    const Eigen::Vector3d& direction) const
 {
   // Cheap, and nearly every ray to a field of boulders ends here.
-  if (missesBall(origin - pose_.c, direction, outer_radius_))
+  if (std::isinf(nearestPossible(origin, direction)))
     return std::nullopt;
   const Eigen::Vector3d o = toUnitBall(origin);
   const Eigen::Vector3d d = (pose_.R.transpose() * direction).cwiseQuotient(radii_);
@@ -180,6 +197,13 @@ Boulder::intersect(const Eigen::Vector3d& origin,
   return firstRoot([&](double t) { return unitBallValue(o + t * d); },
                    *inside,
                    max_slope);
+}
+
+double
+Boulder::nearestPossible(const Eigen::Vector3d& origin,
+                         const Eigen::Vector3d& direction) const
+{
+  return entryOfBall(origin - pose_.c, direction, outer_radius_);
 }
 
 std::string

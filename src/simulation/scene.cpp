@@ -152,8 +152,11 @@ firstHit(const Scene& scene, const Vector3d& origin, const Vector3d& direction)
   };
   for (const Patch& patch : scene.patches)
     consider(intersectRay(patch, origin, direction));
-  for (const auto& shape : scene.shapes)
-    consider(shape->intersect(origin, direction));
+  for (const auto& shape : scene.shapes) {
+    const bool is_hidden =
+        first && shape->nearestPossible(origin, direction) >= first->t;
+    consider(is_hidden ? std::nullopt : shape->intersect(origin, direction));
+  }
   return first;
 }
 

@@ -1,6 +1,7 @@
 /// \file Fitted patches to and from files.
 #pragma once
 
+#include <holdfast/fusion/patch_map.h>
 #include <holdfast/io/cloud_io.h>
 #include <holdfast/pcl/patch_extraction.h>
 
@@ -24,6 +25,9 @@ struct PatchReport {
   bool covariances_of_cloud = false; ///< not the sensor's noise
   bool whole = false; ///< one patch to all points: the sampler options do not apply
   ExtractionResult result;
+  /// The map whose patches those of the result are, one by one; null: they are of one
+  /// cloud. Each then says under "map" what the map knows of it.
+  const PatchMap* map = nullptr;
   double load_ms = 0.0;
   double fit_ms = 0.0;
 };

@@ -72,13 +72,14 @@ public:
 private:
   struct Measured;
   struct Places;
+  void matchSensor(const RangeCloud& frame);
   Places placesIn(const RangeCloud& frame, const Pose& sensor, FrameReport& report);
   Measured measure(const RangeCloud& frame, const Pose& sensor, FrameReport& report);
   void update(const Measured& measured, FrameReport& report);
   void moveByRegistration(const Measured& measured, FrameReport& report);
 
   Sensor sensor_;
-  std::optional<Camera> camera_; ///< on whose pixels the frames lie
+  std::optional<Sensor> matched_; ///< with the camera on whose pixels the frames lie
   MappingOptions options_;
   PatchMap map_;
   Pose last_increment_; ///< of a motion that was found

@@ -36,6 +36,14 @@ public:
   virtual std::optional<double> intersect(const Eigen::Vector3d& origin,
                                           const Eigen::Vector3d& direction) const = 0;
 
+  /// A t that intersect() does not fall below, and cheaper: what something nearer hides
+  /// need not be looked for. Infinite where the ray misses for sure.
+  virtual double nearestPossible(const Eigen::Vector3d& /*origin*/,
+                                 const Eigen::Vector3d& /*direction*/) const
+  {
+    return 0.0;
+  }
+
   virtual std::string name() const = 0;
   virtual std::vector<ShapeParameter> parameters() const = 0;
 };
@@ -133,6 +141,8 @@ public:
           std::uint64_t seed);
   std::optional<double> intersect(const Eigen::Vector3d& origin,
                                   const Eigen::Vector3d& direction) const override;
+  double nearestPossible(const Eigen::Vector3d& origin,
+                         const Eigen::Vector3d& direction) const override;
   std::string name() const override;
   std::vector<ShapeParameter> parameters() const override;
 
@@ -140,6 +150,9 @@ public:
   double heightAt(double x, double y) const;
 
 private:
+  /// Half the size of the box that holds it.
+  Eigen::Vector3d halfBox() const;
+
   Eigen::Vector3d center_;
   double size_;
   double bump_length_;
@@ -158,6 +171,8 @@ public:
           std::uint64_t seed);
   std::optional<double> intersect(const Eigen::Vector3d& origin,
                                   const Eigen::Vector3d& direction) const override;
+  double nearestPossible(const Eigen::Vector3d& origin,
+                         const Eigen::Vector3d& direction) const override;
   std::string name() const override;
   std::vector<ShapeParameter> parameters() const override;
 

@@ -1,0 +1,302 @@
+#include "commands.h"
+#include "console.h"
+#include "map/frame_poses.h"
+#include "map/map_settings.h"
+#include "map/map_summary.h"
+
+#include <holdfast/io/atomic_file.h>
+#include <holdfast/io/cloud_io.h>
+#include <holdfast/io/patch_io.h>
+#include <holdfast/io/patch_map_file.h>
+#include <holdfast/pcl/frame_mapping.h>
+#include <holdfast/pcl/intrinsics.h>
+
+#include <CLI/CLI.hpp>
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+
+namespace holdfast::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kExamples = R"(Examples:
+  holdfast simulate boulder_field --trajectory walk --frames 40 -o walk
+  holdfast map walk --poses walk/trajectory.txt -o walk.json --ply walk.ply
+      patches over a walk, and how sure they become with every view
+  holdfast map walk -o walk.json
+      the same without poses: each frame finds its own from the patches
+  holdfast map walk --frames 20 -o first.map
+  holdfast map later --resume first.map -o both.map -o both.json
+      goes on where it stopped
+
+A map follows the sensor: the covariance of a patch is that of where it lies from the
+sensor at the last frame. With poses, results are in their frame, else in that of the
+first frame. A pose that is the same as the one before means that the sensor stood still,
+and what its pixels share does not average then.
+)";
+
+/// Files in the order they are taken.
+std::vector<std::string>
+framesOf(const MapSettings& settings)
+{
+  std::vector<std::string> frames;
+  for (const std::string& path : settings.input.clouds) {
+    if (!fs::is_directory(path)) {
+      frames.push_back(path);
+      continue;
+    }
+    std::vector<std::string> inside;
+    for (const auto& entry : fs::directory_iterator(path))
+      if (entry.is_regular_file() && isCloudFile(entry.path().string()))
+        inside.push_back(entry.path().string());
+    if (inside.empty())
+      throw std::runtime_error(path + ": no frame in this folder");
+    std::sort(inside.begin(), inside.end());
+    frames.insert(frames.end(), inside.begin(), inside.end());
+  }
+  if (settings.frames > 0 && frames.size() > static_cast<std::size_t>(settings.frames))
+    frames.resize(static_cast<std::size_t>(settings.frames));
+  return frames;
+}
+
+/// Goes through the frames.
+class Mapping {
+public:
+  Mapping(const MapSettings& settings, const Sensor& sensor)
+  : settings_(settings), sensor_(sensor)
+  {}
+
+  void run(const std::vector<std::string>& frames)
+  {
+    std::vector<Pose> poses;
+    if (!settings_.poses.empty() && settings_.poses != "none") {
+      std::vector<std::string> notices;
+      poses = posesOf(frames, settings_.poses, notices);
+      if (!settings_.pose_sigma_given)
+        notices.push_back("steps between poses count as known to 1 mrad and 1 mm; "
+                          "--pose-sigma says otherwise");
+      note(settings_.poses, notices);
+    }
+    start(poses);
+    ProgressBar bar("mapping", !settings_.quiet);
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      add(frames[i], i, poses);
+      bar.update(static_cast<int>(i + 1), static_cast<int>(frames.size()));
+    }
+  }
+
+  const PatchMap& map() const
+  {
+    return mapper_->map();
+  }
+
+  std::vector<FitResult> fits() const
+  {
+    FitOptions options = settings_.extraction.options.fit;
+    std::vector<FitResult> fits;
+    for (const MapPatch& patch : map().patches())
+      fits.push_back(toFitResult(patch, options));
+    return fits;
+  }
+
+  const std::vector<double>& singleSigmas() const
+  {
+    return single_sigmas_;
+  }
+  const Sensor& sensor() const
+  {
+    return sensor_;
+  }
+
+private:
+  void note(const std::string& path, const std::vector<std::string>& notices)
+  {
+    if (settings_.quiet)
+      return;
+    for (const std::string& notice : notices)
+      if (std::find(said_.begin(), said_.end(), notice) == said_.end()) {
+        said_.push_back(notice); // once, not for every frame
+        printNotice(path + ": " + notice);
+      }
+  }
+
+  void start(const std::vector<Pose>& poses)
+  {
+    MappingOptions options;
+    options.extraction = settings_.extraction.options;
+    options.map.radius_m = options.extraction.sampler.radius_m;
+    options.map.min_radius_m = std::min(options.map.min_radius_m, options.map.radius_m);
+    options.map = mapOptionsFor(sensor_, options.map);
+    if (settings_.resume.empty()) {
+      PatchMap::Snapshot empty;
+      empty.options = options.map;
+      if (!poses.empty())
+        empty.pose = poses.front();
+      mapper_.emplace(sensor_, options, PatchMap(empty));
+      return;
+    }
+    StoredMap stored = loadPatchMap(settings_.resume);
+    if (stored.sensor != sensor_.name)
+      throw std::runtime_error(fmt::format("{}: is a map of sensor {}, not of {}",
+                                           settings_.resume,
+                                           stored.sensor,
+                                           sensor_.name));
+    if (!poses.empty())
+      last_pose_ = stored.map.pose();
+    mapper_.emplace(sensor_, options, std::move(stored.map));
+  }
+
+  RangeCloud load(const std::string& path)
+  {
+    CloudFileInfo file;
+    RangeCloud cloud = loadCloud(path, loadOptions(settings_.input, sensor_), &file);
+    std::vector<std::string> notices = inputNotices(settings_.input, file);
+    cloud = withoutPatternMap(path, cloud, sensorOf(file, sensor_), notices);
+    note(path, notices);
+    if (cloud.points->height < 2)
+      throw std::runtime_error(path + ": a map wants frames of a camera, and these "
+                                      "points lie on no rows and columns");
+    return cloud;
+  }
+
+  void add(const std::string& path, std::size_t index, const std::vector<Pose>& poses)
+  {
+    const RangeCloud cloud = load(path);
+    const Stopwatch clock;
+    const FrameReport report = addTo(cloud, index, poses);
+    if (!settings_.quiet)
+      std::cout << frameLine(fs::path(path).filename().string(),
+                             report,
+                             map().patches().size(),
+                             clock.milliseconds());
+    note(path, report.extraction.notices);
+    for (const ExtractedPatch& patch : report.extraction.patches)
+      single_sigmas_.push_back(centreSigma(patch.fit, patch.fit.state.normal));
+  }
+
+  FrameReport addTo(const RangeCloud& cloud,
+                    std::size_t index,
+                    const std::vector<Pose>& poses)
+  {
+    if (poses.empty())
+      return mapper_->addUnknown(cloud);
+    const std::optional<Pose> before = last_pose_;
+    last_pose_ = poses[index];
+    if (!before)
+      return mapper_->addStill(cloud);
+    const Pose increment = before->inverse() * poses[index];
+    constexpr double kStill = 1e-9; // m and rad: rounding of a file
+    if (increment.c.norm() < kStill && increment.R.isIdentity(kStill))
+      return mapper_->addStill(cloud);
+    Motion motion{increment, JetMatrix::Zero()};
+    const auto [rad, m] = settings_.pose_sigma;
+    motion.covariance.diagonal() << Eigen::Vector3d::Constant(rad * rad),
+        Eigen::Vector3d::Constant(m * m);
+    return mapper_->add(cloud, motion);
+  }
+
+  const MapSettings& settings_;
+  Sensor sensor_;
+  std::optional<FrameMapper> mapper_;
+  std::optional<Pose> last_pose_;
+  std::vector<double> single_sigmas_;
+  std::vector<std::string> said_;
+};
+
+/// The map as the patches of one cloud.
+PatchReport
+reportOf(const Mapping& mapping,
+         const MapSettings& settings,
+         const std::vector<std::string>& frames,
+         const std::vector<FitResult>& fits)
+{
+  PatchReport report;
+  report.cloud = fmt::format("map of {} frames, {} to {}",
+                             frames.size(),
+                             fs::path(frames.front()).filename().string(),
+                             fs::path(frames.back()).filename().string());
+  report.sensor_pose = mapping.map().pose();
+  report.options = settings.extraction.options;
+  report.result.sensor = mapping.sensor();
+  report.map = &mapping.map();
+  for (std::size_t i = 0; i < fits.size(); ++i) {
+    ExtractedPatch patch;
+    patch.fit = fits[i];
+    patch.radius_m = mapping.map().patches()[i].radius_m;
+    report.result.patches.push_back(std::move(patch));
+  }
+  return report;
+}
+
+/// All or none.
+void
+write(const PatchReport& report, const Mapping& mapping, const MapSettings& settings)
+{
+  std::vector<std::unique_ptr<AtomicFile>> files;
+  std::vector<AtomicFile*> pointers;
+  const auto open = [&](const std::string& path) -> std::ostream& {
+    files.push_back(std::make_unique<AtomicFile>(path));
+    pointers.push_back(files.back().get());
+    return files.back()->stream();
+  };
+  for (const std::string& output : settings.outputs)
+    if (fs::path(output).extension() == ".json")
+      writeJson(open(output), report, JsonLayout::PatchPerLine);
+    else
+      writePatchMap(open(output), {mapping.map(), mapping.sensor().name});
+  if (!settings.ply.empty())
+    writeMesh(open(settings.ply), report.result.patches, false);
+  AtomicFile::commit(pointers);
+}
+
+int
+runMap(const CLI::App& command, MapSettings& settings)
+{
+  finishMapOptions(command, settings);
+  const Sensor named = loadSensorOption(settings.input.sensor_name);
+  const std::vector<std::string> frames = framesOf(settings);
+  Mapping mapping(settings, settings.no_pattern ? withoutPattern(named) : named);
+  mapping.run(frames);
+  const std::vector<FitResult> fits = mapping.fits();
+  if (!settings.quiet)
+    std::cout << mapTable(mapping.map(), fits, mapping.singleSigmas()) << std::flush;
+  if (mapping.map().patches().empty())
+    throw std::runtime_error("no patch in any of the frames: no map is written");
+  write(reportOf(mapping, settings, frames, fits), mapping, settings);
+  return 0;
+}
+
+} // namespace
+
+void
+addMapCommand(CLI::App& app, int& exit_code)
+{
+  CLI::App* command = app.add_subcommand(
+      "map",
+      "Fuse the patches of many frames of a moving camera into a map");
+  command->footer(kExamples);
+  const auto settings = std::make_shared<MapSettings>();
+  addMapOptions(*command, *settings);
+  command->callback([command, settings, &exit_code] {
+    try {
+      exit_code = runMap(*command, *settings);
+    }
+    catch (const CLI::Error&) {
+      throw;
+    }
+    catch (const std::exception& error) {
+      printError(error.what());
+      exit_code = 1;
+    }
+  });
+}
+
+} // namespace holdfast::app
