@@ -450,6 +450,70 @@ TEST_F(ExperimentProgram, RealWantsOrganizedCloudsWithAPlane)
     EXPECT_EQ(experiment(arguments).exit_code, 2);
 }
 
+TEST_F(ExperimentProgram, FusionShowsWhatDoesNotAverage)
+{
+  const Json json = shortRun("fusion", {"--threads", "1"});
+  EXPECT_EQ(json, shortRun("fusion", {"--threads", "2"}));
+  std::map<std::string, double> nees; // case, rule, number of views
+  for (const Json& row : json.at("rows"))
+    nees[row.at("case").get<std::string>() + "/" + row.at("rule").get<std::string>() +
+         "/" + row.at("views").dump()] = row.at("nees_per_dof");
+  EXPECT_EQ(nees.size(), json.at("rows").size());
+  // The mean of twenty has a standard error of 0.13.
+  for (const char* row : {"same support/model error/16",
+                          "within 1 cm, s3 30/model error/16",
+                          "2 mrad, 2 mm a view/robot-centric/25",
+                          "pattern white in space/epoch/30"}) {
+    EXPECT_GT(nees.at(row), 0.5) << row;
+    EXPECT_LT(nees.at(row), 1.6) << row;
+  }
+  EXPECT_GT(nees.at("within 3 cm, s3 100/neither/64"), 5.0);
+  EXPECT_GT(nees.at("2 mrad, 2 mm a view/as if exact/25"), 5.0);
+  EXPECT_GT(nees.at("pattern of the xtion/as if independent/30"), 3.0);
+  for (const char* ground : {"gentle ground", "rocks"})
+    EXPECT_LT(
+        nees.at(std::string(ground) + ", guess 1 mrad, 1 mm/300 of 500 patches/1"),
+        3.0)
+        << ground;
+}
+
+TEST_F(ExperimentProgram, MapWalksThroughAScene)
+{
+  const auto walk = [&](const std::string& threads) {
+    const test::ProgramRun run = experiment({"map",
+                                             "--scene",
+                                             "boulder_field",
+                                             "--frames",
+                                             "4",
+                                             "--stride",
+                                             "6",
+                                             "--json",
+                                             "-",
+                                             "--threads",
+                                             threads});
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    Json json = Json::parse(run.out, nullptr, false);
+    for (Json& row : json.at("rows"))
+      for (const char* time : {"ms_frame", "ms_update"})
+        row.erase(time);
+    return json;
+  };
+  const Json json = walk("1");
+  EXPECT_EQ(json, walk("2"));
+  int patches = 0, all = 0;
+  for (const Json& row : json.at("rows")) {
+    if (row.at("poses") != "odometry")
+      continue;
+    const std::string of = row.at("of");
+    if (of == "all")
+      all = row.at("patches");
+    else if (of.find("view") != std::string::npos || of == "16 or more")
+      patches += row.at("patches").get<int>();
+  }
+  EXPECT_GT(all, 100);
+  EXPECT_EQ(patches, all);
+}
+
 TEST_F(ExperimentProgram, WritesTableAndFiles)
 {
   const std::string out = folder_ + "/new/results";

@@ -89,11 +89,10 @@ heightAndNormalNees(const PatchMap& map,
     // Where the disc lies over an edge of a rock, no quadric is the surface. Third
     // derivatives of 100 /m^2 leave 0.4 mm.
     constexpr double kEdge = 2e-3;
-    double rms = 0.0;
-    const auto truth = trueJet(scene, to_world * patch.anchor, patch.radius_m, &rms);
-    if (!truth || patch.views < least_views || rms > kEdge)
+    const auto truth = bestQuadric(scene, to_world * patch.anchor, patch.radius_m);
+    if (!truth || patch.views < least_views || truth->residual_m > kEdge)
       continue;
-    const Eigen::Vector3d e = (patch.jet.value() - *truth).head<3>();
+    const Eigen::Vector3d e = (patch.jet.value() - truth->jet).head<3>();
     const Eigen::Matrix3d S = patch.jet.covariance().topLeftCorner<3, 3>();
     const double nees = e.dot(S.inverse() * e) / 3.0;
     sum += nees;

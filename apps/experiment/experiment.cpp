@@ -32,7 +32,9 @@ experiments()
           figureSixExperiment(),
           neighborhoodsExperiment(),
           pclExperiment(),
-          realExperiment()};
+          realExperiment(),
+          fusionExperiment(),
+          mapExperiment()};
 }
 
 struct ExperimentArguments {
@@ -175,7 +177,7 @@ addCommonOptions(CLI::App& command,
   const std::string group = "Run";
   arguments.settings.trials = experiment.default_trials;
   command.add_option("--trials", arguments.settings.trials, experiment.trials_meaning)
-      ->check(CLI::Range(2, 100000000, "N"))
+      ->check(CLI::Range(experiment.fewest_trials, 100000000, "N"))
       ->type_name("")
       ->capture_default_str()
       ->group(group);

@@ -32,6 +32,7 @@ struct Experiment {
   /// when they are parsed. It may throw as commands do (commands.h).
   std::function<ExperimentRun(CLI::App& command)> prepare;
   std::string former_name = {}; ///< which still works; empty: none
+  int fewest_trials = 2;
 };
 
 Experiment tableOneExperiment();
@@ -41,6 +42,8 @@ Experiment figureSixExperiment();
 Experiment neighborhoodsExperiment();
 Experiment pclExperiment();
 Experiment realExperiment();
+Experiment fusionExperiment();
+Experiment mapExperiment();
 
 /// Adds --data DIR, the folder of recorded clouds (also from the environment variable
 /// HOLDFAST_DATA_DIR). `folder` must outlive the parsing.

@@ -48,8 +48,8 @@ raysAround(const Camera& camera,
 
 } // namespace
 
-std::optional<JetVector>
-trueJet(const Scene& scene, const Pose& anchor, double radius_m, double* rms_m)
+std::optional<BestQuadric>
+bestQuadric(const Scene& scene, const Pose& anchor, double radius_m)
 {
   // Gauss points over the square of the radius and equal angles integrate polynomials
   // of the disc up to degree nine exactly.
@@ -68,7 +68,7 @@ trueJet(const Scene& scene, const Pose& anchor, double radius_m, double* rms_m)
   const double turn = boost::math::constants::two_pi<double>() / kAngles;
   JetMatrix M = JetMatrix::Zero();
   JetVector b = JetVector::Zero();
-  double squares = 0.0, weights = 0.0;
+  double squares = 0.0;
   for (std::size_t i = 0; i < kAt.size(); ++i)
     for (int k = 0; k < kAngles; ++k) {
       const double r = std::sqrt(kAt[i]);
@@ -80,18 +80,24 @@ trueJet(const Scene& scene, const Pose& anchor, double radius_m, double* rms_m)
       if (!hit || hit->t > 2.0 * kAbove * radius_m)
         return std::nullopt;
       const JetVector basis = jetBasis(x, y); // in radii
-      M += kWeight[i] * basis * basis.transpose();
       const double height = kAbove * radius_m - hit->t;
-      b += kWeight[i] * height * basis;
-      squares += kWeight[i] * height * height;
-      weights += kWeight[i];
+      const double weight = kWeight[i] / kAngles;
+      M += weight * basis * basis.transpose();
+      b += weight * height * basis;
+      squares += weight * height * height;
     }
   JetVector jet = M.ldlt().solve(b);
-  if (rms_m)
-    *rms_m = std::sqrt(std::max(0.0, squares - jet.dot(b)) / weights);
+  const double residual = std::sqrt(std::max(0.0, squares - b.dot(jet)));
   jet.segment<2>(1) /= radius_m;
   jet.tail<3>() /= radius_m * radius_m;
-  return jet;
+  return BestQuadric{jet, residual};
+}
+
+std::optional<JetVector>
+trueJet(const Scene& scene, const Pose& anchor, double radius_m)
+{
+  const auto best = bestQuadric(scene, anchor, radius_m);
+  return best ? std::optional(best->jet) : std::nullopt;
 }
 
 SpotView::SpotView(const Scene& scene,

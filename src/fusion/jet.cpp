@@ -205,8 +205,8 @@ jetAt(const FitResult& fit, const Pose& anchor, const ThirdToJet& by_third)
   jet.value = solved->jetOf(solved->h);
   const JetMatrix all = symmetric(J * fit.state_covariance * J.transpose());
   jet.white = all;
-  if (fit.white_state_covariance.size() > 0) {
-    jet.white = symmetric(J * fit.white_state_covariance * J.transpose());
+  if (fit.white_state_covariance->size() > 0) {
+    jet.white = symmetric(J * *fit.white_state_covariance * J.transpose());
     jet.pattern = all - jet.white;
   }
   return jet;

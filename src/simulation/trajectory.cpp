@@ -195,16 +195,28 @@ FrameSimulator::FrameSimulator(Scene scene,
 RangeImage
 FrameSimulator::frame(int k, const Pose& sensor_pose) const
 {
-  if (k < 0)
-    throw std::invalid_argument("FrameSimulator: frames are counted from 0");
+  return withNoise(k, truth(sensor_pose));
+}
+
+RangeImage
+FrameSimulator::truth(const Pose& sensor_pose) const
+{
   Scene seen = scene_; // shares its shapes
   seen.sensor_pose = sensor_pose;
+  return castRays(seen, rays_, sensor_.min_range_m, sensor_.max_range_m);
+}
+
+RangeImage
+FrameSimulator::withNoise(int k, RangeImage image) const
+{
+  if (k < 0)
+    throw std::invalid_argument("FrameSimulator: frames are counted from 0");
   std::mt19937_64 generator = generatorOf(static_cast<std::uint32_t>(k) + 1);
-  if (field_.empty())
-    return simulate(seen, rays_, sensor_, options_, generator);
-  RangeImage image = castRays(seen, rays_, sensor_.min_range_m, sensor_.max_range_m);
   attachNoise(image, sensor_, options_.noise_scale);
-  drawOnFixedPattern(generator, image);
+  if (field_.empty())
+    drawNoise(image, generator, image.points);
+  else
+    drawOnFixedPattern(generator, image);
   if (options_.quantize)
     quantizeDisparity(image, sensor_);
   return image;

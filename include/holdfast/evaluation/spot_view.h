@@ -14,15 +14,24 @@
 
 namespace holdfast {
 
+/// A quadric and how well it is one.
+struct BestQuadric {
+  JetVector jet; ///< at the anchor
+  double residual_m = 0.0; ///< root mean square over the disc, along the anchor's axis
+};
+
 /// The best quadric of a scene over a disc in the plane of an anchor, by least squares
 /// along the anchor's axis, as its jet there: what a patch of the map estimates.
-/// \param rms_m if not null: root mean square distance of the surface from it, m. Large
-///        where the disc lies over an edge.
+/// Its residual is large where the disc lies over an edge.
 /// \return nothing where a part of the disc has no surface within two radii.
+std::optional<BestQuadric> bestQuadric(const Scene& scene,
+                                       const Pose& anchor,
+                                       double radius_m);
+
+/// The jet of bestQuadric().
 std::optional<JetVector> trueJet(const Scene& scene,
                                  const Pose& anchor,
-                                 double radius_m,
-                                 double* rms_m = nullptr);
+                                 double radius_m);
 
 /// The pixels of a camera whose rays meet a scene within a disc.
 class SpotView {

@@ -72,9 +72,14 @@ public:
                  std::uint64_t seed);
 
   /// Frame k, taken from a pose. White noise is drawn anew for each k; which frames
-  /// were asked for before makes no difference. World frame, as simulate(). \param k >=
-  /// 0.
+  /// were asked for before makes no difference. World frame, as simulate().
+  /// \param k >= 0.
   RangeImage frame(int k, const Pose& sensor_pose) const;
+
+  /// The same in two steps, for cameras that differ in their noise alone: rays are what
+  /// takes time. frame(k, pose) = withNoise(k, truth(pose)).
+  RangeImage truth(const Pose& sensor_pose) const;
+  RangeImage withNoise(int k, RangeImage image) const;
 
   /// Scene::sensor_pose of it is not used.
   const Scene& scene() const
