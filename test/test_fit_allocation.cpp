@@ -91,12 +91,12 @@ TEST(MapAllocation, NoneInSteadyState)
   std::vector<Measurement> measurements{*view.measure(estimator, random.engine())};
   map.update(measurements);
   map.update(measurements); // has seen what it keeps for candidates
-  const long before = allocations;
+  const long before = test::allocations;
   for (int frame = 0; frame < 10; ++frame) {
     map.move(Pose(), 1e-8 * JetMatrix::Identity());
     map.update(measurements);
   }
-  EXPECT_EQ(allocations - before, 0);
+  EXPECT_EQ(test::allocations - before, 0);
   EXPECT_EQ(map.patches().size(), 1u);
 }
 

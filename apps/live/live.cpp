@@ -7,16 +7,19 @@
 #include "grabber_run.h"
 #include "input_options.h"
 #include "live_statistics.h"
+#include "map/map_output.h"
 #include "patch_output.h"
 #include "patch_view.h"
 #include "recording.h"
 
 #include <holdfast/pcl/frame_extraction.h>
+#include <holdfast/pcl/frame_mapping.h>
 #include <holdfast/pcl/pattern_subtraction.h>
 
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <fstream>
 #include <iostream>
 #include <memory>
@@ -39,6 +42,8 @@ constexpr const char* kExamples = R"(Examples:
       keeps what the camera saw, and the patches of every frame
   holdfast live --device walk.oni --every-frame -o walk
       the same patches, and those of all frames, from the recording
+  holdfast live --device walk.oni --every-frame --map walk.json
+      what the frames say together, fused (samples/maps.md)
 
 Newer frames replace those that wait, so that patches are always of the latest view;
 frames lost that way are counted as dropped. Seeds whose patch was good in the frame
@@ -59,6 +64,7 @@ struct LiveSettings {
   std::string record_path;
   std::string json_path; ///< empty: none; "-": standard output
   std::string output_folder; ///< empty: none
+  std::vector<std::string> map_files; ///< empty: no map is kept
   bool view = false;
 };
 
@@ -100,11 +106,7 @@ public:
   /// On the grabber's thread.
   void process(const RangeFrame::ConstPtr& frame);
 
-  void finish()
-  {
-    if (recording_)
-      recording_->finish();
-  }
+  void finish();
 
   /// "3 dropped", and what the disk was too slow for.
   std::string droppedText() const;
@@ -124,11 +126,14 @@ public:
 
 private:
   void write(const RangeFrame& frame);
+  ExtractionResult extract(const RangeCloud& cloud);
 
   const LiveSettings& settings_;
   Openni2Grabber& grabber_;
   Sensor sensor_;
   FrameExtractor extractor_;
+  std::optional<FrameMapper> mapper_;
+  int lost_frames_ = 0; ///< whose pose in the map was not found
   std::optional<Recording> recording_;
   std::optional<JsonLines> json_;
   std::optional<PatchView> view_;
@@ -155,6 +160,14 @@ LiveSession::LiveSession(const LiveSettings& settings, Openni2Grabber& grabber)
     throw std::runtime_error("frames of " + error);
   if (!settings.output_folder.empty())
     makeFrameFolder(settings.output_folder);
+  if (!settings.map_files.empty()) {
+    MappingOptions options;
+    options.extraction = settings.extraction.options;
+    options.map.radius_m = options.extraction.sampler.radius_m;
+    options.map.min_radius_m = std::min(options.map.min_radius_m, options.map.radius_m);
+    options.map = mapOptionsFor(sensor_, options.map);
+    mapper_.emplace(sensor_, options);
+  }
   if (settings.view)
     view_.emplace();
   if (!settings.json_path.empty())
@@ -163,14 +176,45 @@ LiveSession::LiveSession(const LiveSettings& settings, Openni2Grabber& grabber)
     recording_.emplace(grabber, settings.record_path, settings.device.playback);
 }
 
+ExtractionResult
+LiveSession::extract(const RangeCloud& cloud)
+{
+  if (!mapper_)
+    return extractor_.extract(cloud, std::move(report_.result));
+  FrameReport report = mapper_->addUnknown(cloud);
+  if (report.registration &&
+      report.registration->status != RegistrationStatus::Converged)
+    ++lost_frames_;
+  return std::move(report.extraction);
+}
+
+void
+LiveSession::finish()
+{
+  if (recording_)
+    recording_->finish();
+  if (!mapper_)
+    return;
+  const PatchMap& map = mapper_->map();
+  if (map.patches().empty())
+    throw std::runtime_error("no patch in any frame: no map is written");
+  writeMap(map,
+           sensor_,
+           settings_.extraction.options,
+           fmt::format("map of {} frames", map.frames()),
+           {settings_.map_files, ""});
+  if (!settings_.run.quiet && lost_frames_ > 0)
+    printNotice(fmt::format("{} frames are not in the map: their pose was not found",
+                            lost_frames_));
+}
+
 void
 LiveSession::process(const RangeFrame::ConstPtr& frame)
 {
   if (recording_)
     recording_->push(frame);
   const Stopwatch watch;
-  report_.result = extractor_.extract(subtractPatternMap(frame->cloud, sensor_),
-                                      std::move(report_.result));
+  report_.result = extract(subtractPatternMap(frame->cloud, sensor_));
   report_.fit_ms = watch.milliseconds();
   statistics_.addFrame(frame->received, report_.result.patches);
   if (view_)
@@ -270,6 +314,18 @@ addLiveOptions(CLI::App& command, LiveSettings& settings)
                   "Write the patches of each frame that has any as "
                   "frame_000001.patches.json, .pcd and .ply here")
       ->type_name("DIR")
+      ->group("Output");
+  command
+      .add_option("--map",
+                  settings.map_files,
+                  "Keep a map of the patches, whose frames find their own poses, and "
+                  "write it at the end: FILE.json or FILE.map, as 'holdfast map' does")
+      ->check(CLI::Validator(
+          [](std::string& path) {
+            return isMapOutput(path) ? "" : path + " is neither *.json nor *.map";
+          },
+          ""))
+      ->type_name("FILE")
       ->group("Output");
   command
       .add_flag("--view",

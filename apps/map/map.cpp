@@ -1,12 +1,11 @@
 #include "commands.h"
 #include "console.h"
 #include "map/frame_poses.h"
+#include "map/map_output.h"
 #include "map/map_settings.h"
 #include "map/map_summary.h"
 
-#include <holdfast/io/atomic_file.h>
 #include <holdfast/io/cloud_io.h>
-#include <holdfast/io/patch_io.h>
 #include <holdfast/io/patch_map_file.h>
 #include <holdfast/pcl/frame_mapping.h>
 #include <holdfast/pcl/intrinsics.h>
@@ -96,15 +95,6 @@ public:
   const PatchMap& map() const
   {
     return mapper_->map();
-  }
-
-  std::vector<FitResult> fits() const
-  {
-    FitOptions options = settings_.extraction.options.fit;
-    std::vector<FitResult> fits;
-    for (const MapPatch& patch : map().patches())
-      fits.push_back(toFitResult(patch, options));
-    return fits;
   }
 
   const std::vector<double>& singleSigmas() const
@@ -211,52 +201,6 @@ private:
   std::vector<std::string> said_;
 };
 
-/// The map as the patches of one cloud.
-PatchReport
-reportOf(const Mapping& mapping,
-         const MapSettings& settings,
-         const std::vector<std::string>& frames,
-         const std::vector<FitResult>& fits)
-{
-  PatchReport report;
-  report.cloud = fmt::format("map of {} frames, {} to {}",
-                             frames.size(),
-                             fs::path(frames.front()).filename().string(),
-                             fs::path(frames.back()).filename().string());
-  report.sensor_pose = mapping.map().pose();
-  report.options = settings.extraction.options;
-  report.result.sensor = mapping.sensor();
-  report.map = &mapping.map();
-  for (std::size_t i = 0; i < fits.size(); ++i) {
-    ExtractedPatch patch;
-    patch.fit = fits[i];
-    patch.radius_m = mapping.map().patches()[i].radius_m;
-    report.result.patches.push_back(std::move(patch));
-  }
-  return report;
-}
-
-/// All or none.
-void
-write(const PatchReport& report, const Mapping& mapping, const MapSettings& settings)
-{
-  std::vector<std::unique_ptr<AtomicFile>> files;
-  std::vector<AtomicFile*> pointers;
-  const auto open = [&](const std::string& path) -> std::ostream& {
-    files.push_back(std::make_unique<AtomicFile>(path));
-    pointers.push_back(files.back().get());
-    return files.back()->stream();
-  };
-  for (const std::string& output : settings.outputs)
-    if (fs::path(output).extension() == ".json")
-      writeJson(open(output), report, JsonLayout::PatchPerLine);
-    else
-      writePatchMap(open(output), {mapping.map(), mapping.sensor().name});
-  if (!settings.ply.empty())
-    writeMesh(open(settings.ply), report.result.patches, false);
-  AtomicFile::commit(pointers);
-}
-
 int
 runMap(const CLI::App& command, MapSettings& settings)
 {
@@ -265,12 +209,19 @@ runMap(const CLI::App& command, MapSettings& settings)
   const std::vector<std::string> frames = framesOf(settings);
   Mapping mapping(settings, settings.no_pattern ? withoutPattern(named) : named);
   mapping.run(frames);
-  const std::vector<FitResult> fits = mapping.fits();
+  const ExtractionOptions& options = settings.extraction.options;
   if (!settings.quiet)
-    std::cout << mapTable(mapping.map(), fits, mapping.singleSigmas()) << std::flush;
+    std::cout << mapTable(mapping.map(),
+                          fitsOf(mapping.map(), options.fit),
+                          mapping.singleSigmas())
+              << std::flush;
   if (mapping.map().patches().empty())
     throw std::runtime_error("no patch in any of the frames: no map is written");
-  write(reportOf(mapping, settings, frames, fits), mapping, settings);
+  const std::string name = fmt::format("map of {} frames, {} to {}",
+                                       frames.size(),
+                                       fs::path(frames.front()).filename().string(),
+                                       fs::path(frames.back()).filename().string());
+  writeMap(mapping.map(), mapping.sensor(), options, name, settings.output);
   return 0;
 }
 

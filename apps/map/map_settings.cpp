@@ -5,16 +5,8 @@
 
 #include <CLI/CLI.hpp>
 
-#include <filesystem>
-
 namespace holdfast::app {
 namespace {
-
-std::string
-extensionOf(const std::string& path)
-{
-  return std::filesystem::path(path).extension().string();
-}
 
 void
 addPoseOptions(CLI::App& command, MapSettings& settings)
@@ -58,12 +50,15 @@ addMapOptions(CLI::App& command, MapSettings& settings)
       ->type_name("MAP");
   command
       .add_option("-o,--output",
-                  settings.outputs,
+                  settings.output.files,
                   "FILE.json: the patches as 'fit' writes them, each with what the map "
                   "knows of it; FILE.map: the map itself, to go on with; may be given "
                   "twice")
       ->type_name("FILE");
-  command.add_option("--ply", settings.ply, "Write the patches as one coloured mesh")
+  command
+      .add_option("--ply",
+                  settings.output.ply,
+                  "Write the patches as one coloured mesh")
       ->type_name("FILE");
   addExtractionOptions(command, settings.extraction);
   addQuietOption(command, settings.quiet);
@@ -83,8 +78,8 @@ finishMapOptions(const CLI::App& command, MapSettings& settings)
   if (settings.extraction.options.sampler.neighborhood == Neighborhood::Knn)
     throw CLI::ValidationError("--neighborhood",
                                "a map wants neighbourhoods of one radius, not knn");
-  for (const std::string& output : settings.outputs)
-    if (extensionOf(output) != ".json" && extensionOf(output) != ".map")
+  for (const std::string& output : settings.output.files)
+    if (!isMapOutput(output))
       throw CLI::ValidationError("--output", output + " is neither *.json nor *.map");
   if (settings.pose_sigma_given && (settings.poses.empty() || settings.poses == "none"))
     throw CLI::ValidationError("--pose-sigma", "goes with --poses FILE");

@@ -3,6 +3,7 @@
 
 #include "extraction_options.h"
 #include "input_options.h"
+#include "map/map_output.h"
 
 #include <array>
 #include <string>
@@ -20,8 +21,7 @@ struct MapSettings {
   bool pose_sigma_given = false;
   int frames = 0; ///< of those given, the first so many; 0: all
   std::string resume; ///< map to go on with
-  std::vector<std::string> outputs; ///< .json or .map
-  std::string ply;
+  MapOutput output;
   bool quiet = false;
 };
 

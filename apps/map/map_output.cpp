@@ -1,0 +1,85 @@
+#include "map/map_output.h"
+
+#include <holdfast/io/atomic_file.h>
+#include <holdfast/io/patch_io.h>
+#include <holdfast/io/patch_map_file.h>
+
+#include <filesystem>
+#include <memory>
+#include <utility>
+
+namespace holdfast::app {
+namespace {
+
+bool
+isJson(const std::string& path)
+{
+  return std::filesystem::path(path).extension() == ".json";
+}
+
+/// The map as the patches of one cloud.
+PatchReport
+reportOf(const PatchMap& map,
+         const Sensor& sensor,
+         const ExtractionOptions& options,
+         const std::string& name)
+{
+  PatchReport report;
+  report.cloud = name;
+  report.sensor_pose = map.pose();
+  report.options = options;
+  report.result.sensor = sensor;
+  report.map = &map;
+  const std::vector<FitResult> fits = fitsOf(map, options.fit);
+  for (std::size_t i = 0; i < fits.size(); ++i) {
+    ExtractedPatch patch;
+    patch.fit = fits[i];
+    patch.radius_m = map.patches()[i].radius_m;
+    report.result.patches.push_back(std::move(patch));
+  }
+  return report;
+}
+
+} // namespace
+
+bool
+isMapOutput(const std::string& path)
+{
+  return isJson(path) || std::filesystem::path(path).extension() == ".map";
+}
+
+std::vector<FitResult>
+fitsOf(const PatchMap& map, const FitOptions& options)
+{
+  std::vector<FitResult> fits;
+  for (const MapPatch& patch : map.patches())
+    fits.push_back(toFitResult(patch, options));
+  return fits;
+}
+
+void
+writeMap(const PatchMap& map,
+         const Sensor& sensor,
+         const ExtractionOptions& options,
+         const std::string& name,
+         const MapOutput& output)
+{
+  const PatchReport report = reportOf(map, sensor, options, name);
+  std::vector<std::unique_ptr<AtomicFile>> files;
+  std::vector<AtomicFile*> pointers;
+  const auto open = [&](const std::string& path) -> std::ostream& {
+    files.push_back(std::make_unique<AtomicFile>(path));
+    pointers.push_back(files.back().get());
+    return files.back()->stream();
+  };
+  for (const std::string& path : output.files)
+    if (isJson(path))
+      writeJson(open(path), report, JsonLayout::PatchPerLine);
+    else
+      writePatchMap(open(path), {map, sensor.name});
+  if (!output.ply.empty())
+    writeMesh(open(output.ply), report.result.patches, false);
+  AtomicFile::commit(pointers);
+}
+
+} // namespace holdfast::app
