@@ -49,7 +49,19 @@ struct Group {
   std::string name;
   int least_views = 1, most_views = 1 << 20;
   double least_residual_m = 0.0, most_residual_m = kEdge;
+  double least_slope_sigma = 0.0, most_slope_sigma = 1e9;
 };
+
+/// What is less sure than a tenth of a radian, no first order holds for.
+Group
+bySlope(const char* name, double least, double most)
+{
+  Group group;
+  group.name = name;
+  group.least_slope_sigma = least;
+  group.most_slope_sigma = most;
+  return group;
+}
 
 const std::vector<Group>&
 groups()
@@ -64,6 +76,10 @@ groups()
                                       {"0.3 to 1 mm", 2, kMany, 0.3e-3, 1e-3},
                                       {"1 to 2 mm", 2, kMany, 1e-3, kEdge},
                                       {"over an edge", 2, kMany, kEdge, 1e9},
+                                      bySlope("slope sigma < 0.01", 0.0, 0.01),
+                                      bySlope("0.01 to 0.03", 0.01, 0.03),
+                                      bySlope("0.03 to 0.1", 0.03, 0.1),
+                                      bySlope("above 0.1", 0.1, 1e9),
                                       {"all", 1, kMany}};
   return all;
 }
@@ -75,7 +91,9 @@ isIn(const Group& group, const MapPatchError& patch)
   return patch.residual_m && patch.views >= group.least_views &&
          patch.views <= group.most_views &&
          *patch.residual_m >= group.least_residual_m &&
-         *patch.residual_m < group.most_residual_m;
+         *patch.residual_m < group.most_residual_m &&
+         patch.slope_sigma >= group.least_slope_sigma &&
+         patch.slope_sigma < group.most_slope_sigma;
 }
 
 Json
@@ -116,6 +134,7 @@ emptyRow(const std::string& scene, const std::string& rule, const std::string& g
                           "height_sigma_mm",
                           "single_sigma_mm",
                           "fall",
+                          "frames",
                           "over_edge",
                           "drift",
                           "rotation_mrad",
@@ -173,8 +192,11 @@ addFrames(const std::vector<WalkOutcome>& walks, Json& row)
 {
   Mean drift, rotation, translation, milliseconds, update;
   ErrorComparison increments;
-  int lost = 0, open = 0, gated = 0, taken = 0, edges = 0, patches = 0;
+  int lost = 0, open = 0, gated = 0, taken = 0, edges = 0, patches = 0, frames = 0;
   for (const WalkOutcome& walk : walks) {
+    frames += static_cast<int>(walk.frames.size());
+    if (walk.frames.empty())
+      continue;
     const WalkFrame& last = walk.frames.back();
     if (last.way_m > 0.0)
       drift.add(last.position_error_m / last.way_m);
@@ -199,6 +221,7 @@ addFrames(const std::vector<WalkOutcome>& walks, Json& row)
     }
   }
   row["over_edge"] = patches > 0 ? Json(static_cast<double>(edges) / patches) : Json();
+  row["frames"] = frames;
   row["drift"] = drift.value();
   row["rotation_mrad"] = rotation.root();
   row["translation_mm"] = translation.root();
@@ -289,6 +312,7 @@ describe(const MapChoice& choice, Report& report)
                     {"of one view", "single_sigma_mm"},
                     {"fall", "fall"},
                     {"edges", "over_edge"},
+                    {"frames", "frames"},
                     {"drift", "drift"},
                     {"mrad", "rotation_mrad"},
                     {"mm", "translation_mm"},
@@ -298,6 +322,7 @@ describe(const MapChoice& choice, Report& report)
                     {"gated", "gated"},
                     {"ms/frame", "ms_frame"},
                     {"ms/update", "ms_update"}};
+  const std::vector<std::string> failures = report.remarks;
   report.remarks = {
       fmt::format(
           "A camera 1.2 m above the ground walks {:.3g} m in {} frames, every "
@@ -326,6 +351,7 @@ describe(const MapChoice& choice, Report& report)
       "without a pose, open: with a direction that patches do not tell; gated: share "
       "of "
       "the measurements that the map refused; ms/update: of the map alone."};
+  report.remarks.insert(report.remarks.end(), failures.begin(), failures.end());
 }
 
 void
@@ -375,6 +401,13 @@ runMap(const MapChoice& choice, const ExperimentSettings& settings)
       walk.threads = settings.threads;
       walk.progress = stageProgress(settings.progress, stage++, stages);
       std::vector<WalkOutcome> outcomes = walkThrough(walk, rules());
+      for (std::size_t i = 0; i < outcomes.size(); ++i)
+        if (!outcomes[i].failure.empty())
+          report.remarks.push_back(fmt::format("{}, {}: ended at frame {}: {}",
+                                               scene,
+                                               rules()[i].name,
+                                               outcomes[i].frames.size(),
+                                               outcomes[i].failure));
       if (trial == 0)
         first_walks.push_back(outcomes);
       for (std::size_t i = 0; i < outcomes.size(); ++i)
@@ -383,6 +416,10 @@ runMap(const MapChoice& choice, const ExperimentSettings& settings)
     for (std::size_t i = 0; i < by_rule.size(); ++i)
       addRows(scene, rules()[i], by_rule[i], report.rows);
   }
+  for (const Json& row : report.rows)
+    for (const char* shown : {"1 view", "4-7 views", "16 or more", "all"})
+      if (row["of"] == shown)
+        report.summary.push_back(row);
   describe(choice, report);
   addPlot(choice, first_walks, report);
   return report;

@@ -15,6 +15,7 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <stdexcept>
 #include <utility>
 
 namespace holdfast::app {
@@ -102,23 +103,21 @@ public:
   /// \param seen FrameSimulator::truth() at the true pose of frame k.
   void take(std::size_t k, const RangeImage& seen)
   {
-    const RangeImage image =
-        inSensorFrame(camera_.withNoise(static_cast<int>(k), seen));
-    const RangeCloud cloud = cloudOf(image);
+    if (!outcome_.failure.empty())
+      return;
+    const RangeCloud cloud =
+        cloudOf(inSensorFrame(camera_.withNoise(static_cast<int>(k), seen)));
     const Pose before = mapper_.map().pose();
     const Stopwatch watch;
-    const FrameReport report = map(k, cloud);
-    WalkFrame frame;
-    frame.milliseconds = watch.milliseconds();
-    constexpr std::size_t kTimed = 10; // every so many frames
-    if (k % kTimed == kTimed - 1)
-      frame.update_milliseconds =
-          updateMilliseconds(mapper_.map(), report, report.extraction.sensor.camera);
-    frame.update = report.update;
-    addPose(k, frame);
-    if (report.registration)
-      addRegistration(k, before, *report.registration, frame);
-    outcome_.frames.push_back(frame);
+    FrameReport report;
+    try {
+      report = map(k, cloud);
+    }
+    catch (const std::invalid_argument& error) {
+      outcome_.failure = error.what(); // a row of the table, not its end
+      return;
+    }
+    addFrame(k, before, report, watch.milliseconds());
     record(k);
   }
 
@@ -151,6 +150,24 @@ private:
                        {odometry_.increments[k - 1],
                         incrementCovariance(settings_.odometry_sigma_rad,
                                             settings_.odometry_sigma_m)});
+  }
+
+  void addFrame(std::size_t k,
+                const Pose& before,
+                const FrameReport& report,
+                double milliseconds)
+  {
+    WalkFrame frame;
+    frame.milliseconds = milliseconds;
+    constexpr std::size_t kTimed = 10; // every so many frames
+    if (k % kTimed == kTimed - 1)
+      frame.update_milliseconds =
+          updateMilliseconds(mapper_.map(), report, report.extraction.sensor.camera);
+    frame.update = report.update;
+    addPose(k, frame);
+    if (report.registration)
+      addRegistration(k, before, *report.registration, frame);
+    outcome_.frames.push_back(frame);
   }
 
   void addPose(std::size_t k, WalkFrame& frame) const
@@ -209,6 +226,7 @@ private:
     error.views = s.views;
     error.height_sigma_m = std::sqrt(s.covariance(0, 0));
     error.first_height_sigma_m = s.first_sigma_m;
+    error.slope_sigma = std::sqrt(std::max(s.covariance(1, 1), s.covariance(2, 2)));
     const auto truth = bestQuadric(scene, truth_[s.frame] * s.in_sensor, s.radius_m);
     if (!truth)
       return error;

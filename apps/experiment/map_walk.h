@@ -46,6 +46,7 @@ struct MapPatchError {
   int views = 0;
   double height_sigma_m = 0.0;
   double first_height_sigma_m = 0.0; ///< after its first view
+  double slope_sigma = 0.0; ///< the larger one
   /// What of the true surface is no quadric, root mean square; nothing: there is no
   /// surface below a part of it.
   std::optional<double> residual_m;
@@ -72,6 +73,8 @@ struct WalkFrame {
 struct WalkOutcome {
   std::vector<MapPatchError> patches;
   std::vector<WalkFrame> frames;
+  /// Why the map took no further frame; empty: it took them all.
+  std::string failure;
 };
 
 /// Walks once; all rules see the same scene from the same poses, and those without

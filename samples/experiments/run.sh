@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Makes every table and picture of this folder anew; each JSON names its command, seed
-# and version. A quarter of an hour on two cores.
+# and version. Half an hour on two cores.
 #
 #   samples/experiments/run.sh HOLDFAST [RECORDINGS]
 #
@@ -38,6 +38,9 @@ run pattern consistency --trials 1000 --seed 7 --scene sweep-1.0 --sensor xtion
 run . table1 --trials 10000 --seed 7
 run . figure5 --trials 5000 --seed 7
 run . neighborhoods --trials 200 --seed 7
+# Patches from many views, poses from patches, and maps of whole walks.
+run . fusion --seed 7
+run . map --seed 7
 if [[ -n $recordings ]]; then
   ln -s "$recordings" recordings
   run . figure6 --data recordings
