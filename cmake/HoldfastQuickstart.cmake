@@ -1,6 +1,6 @@
 # What a first look does without, and what samples/quickstart.sh therefore does not
-# compile: all but `holdfast fit` and `holdfast info`, the noise calibration, simulator
-# and evaluation, two covariance modes, and the library holdfast_pcl.
+# compile: all but `holdfast fit` and `holdfast info`, the noise calibration, simulator,
+# maps and evaluation, two covariance modes, and the library holdfast_pcl.
 
 # Plain variables go before the options of the same names, and leave a later build in
 # the same folder as it would have been.
@@ -12,12 +12,12 @@ if(HOLDFAST_QUICKSTART)
 endif()
 
 set(quickstart_without
-  src/simulation/ src/evaluation/ src/sensor/noise_calibration
+  src/simulation/ src/evaluation/ src/fusion/ src/sensor/noise_calibration
   src/sensor/pattern_calibration
   src/uncertainty/stagewise src/uncertainty/second_order
-  src/pcl/frame_extraction
-  src/io/atomic_folder src/io/range_frame src/io/trajectory_file
-  apps/calibrate/ apps/render/ apps/simulate/ apps/plot.cpp)
+  src/pcl/frame_extraction src/pcl/frame_mapping src/pcl/map_conversions
+  src/io/patch_map_file src/io/atomic_folder src/io/range_frame src/io/trajectory_file
+  apps/calibrate/ apps/map/ apps/render/ apps/simulate/ apps/plot.cpp)
 # What stands in for them where the rest calls them.
 set(quickstart_instead src/uncertainty/quickstart/left_out_modes.cpp)
 

@@ -78,8 +78,8 @@ protected:
     const auto run = map(arguments, frames);
     EXPECT_EQ(run.exit_code, exit_code) << run.err;
     EXPECT_NE(run.err.find(part), std::string::npos) << run.err;
-    if (exit_code == 1)
-      EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << run.err;
+    const auto lines = std::count(run.err.begin(), run.err.end(), '\n');
+    EXPECT_TRUE(exit_code == 2 || lines == 1) << run.err;
     EXPECT_FALSE(fs::exists(output));
   }
 
@@ -198,6 +198,8 @@ TEST_F(MapProgram, RefusesFramesAndMapsThatAreNone)
                 1,
                 "is a map of sensor");
   expectRefused({"--surface", "sphere"}, 2, "--surface");
+  write("walk.oni", "");
+  expectRefused({}, 1, "holdfast live", "walk.oni");
   const auto run = map({"-o", folder_ + "/map.txt"});
   EXPECT_EQ(run.exit_code, 2);
 }

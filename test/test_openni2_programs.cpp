@@ -319,6 +319,26 @@ TEST(LiveProgram, SubtractsThePatternMap)
       << other.err;
 }
 
+TEST(LiveProgram, KeepsAMap)
+{
+  const std::string folder = freshFolder("live_fused");
+  const std::string json = folder + "/live.json", stored = folder + "/live.map";
+  const auto run =
+      runProgram(folder,
+                 Arguments{"live", "--frames", "3", "--map", json, "--map", stored} +
+                     kQuick + Arguments{"--budget-ms", "1e6"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  std::ifstream file(json);
+  const auto object = Json::parse(file);
+  ASSERT_FALSE(object.at("patches").empty());
+  EXPECT_TRUE(object.at("patches").front().contains("map"));
+  EXPECT_GT(std::filesystem::file_size(stored), 0u);
+  const auto wrong =
+      runProgram(folder,
+                 Arguments{"live", "--frames", "1", "--map", folder + "/m.txt"});
+  EXPECT_EQ(wrong.exit_code, 2);
+}
+
 TEST(LiveProgram, AnInterruptEndsItWithCompleteFiles)
 {
   const std::string folder = freshFolder("live_interrupt");

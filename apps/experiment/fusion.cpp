@@ -106,7 +106,7 @@ patternCases()
     rule.map = mapOptionsFor(sensor);
     c.rules.push_back(rule);
     rule.name = "as if independent";
-    rule.map.pattern_length = 0.0; // each view is one of its own
+    rule.map.pattern.clear(); // each view has one of its own
     rule.map.max_depth_change = 1e-12;
     rule.map.max_views = kNoFading;
     c.rules.push_back(rule);

@@ -48,6 +48,10 @@ framesOf(const MapSettings& settings)
 {
   std::vector<std::string> frames;
   for (const std::string& path : settings.input.clouds) {
+    if (fs::path(path).extension() == ".oni")
+      throw std::runtime_error(path +
+                               ": is a recording; 'holdfast live --every-frame "
+                               "--device FILE.oni --map FILE' makes a map of it");
     if (!fs::is_directory(path)) {
       frames.push_back(path);
       continue;

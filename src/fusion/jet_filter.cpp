@@ -40,12 +40,6 @@ JetFilter::restored(const JetVector& value,
   return filter;
 }
 
-JetMatrix
-JetFilter::covariance() const
-{
-  return joint_.matrix().topLeftCorner<6, 6>();
-}
-
 void
 JetFilter::changePattern(const JetVector& kept, const JetMatrix& pattern)
 {

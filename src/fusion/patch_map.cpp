@@ -87,15 +87,15 @@ isFit(const Measurement& m)
          (m.jet.covariance().diagonal().array() > 0.0).all();
 }
 
-/// Relative change of a measurement's covariance with an error of one sigma of its
-/// normal: that of the cosine it is seen under.
+/// How far from linear a measurement is in the noise: its normal's uncertainty over the
+/// cosine it is seen under, which is the relative change of its covariance with an
+/// error of one sigma at a graze, and the slope itself where it is seen straight.
 double
 tiltError(const Measurement& m)
 {
   const double cosine = std::abs(m.anchor.R.col(2).dot(m.anchor.c)) / m.anchor.c.norm();
-  const double tangent = std::sqrt(std::max(0.0, 1.0 - cosine * cosine)) / cosine;
   const JetMatrix P = m.jet.covariance();
-  return tangent * std::sqrt(P(1, 1) + P(2, 2));
+  return std::sqrt(P(1, 1) + P(2, 2)) / cosine;
 }
 
 /// Adds the moments of a view, given in its own axes, in the plane of the anchor.
@@ -447,21 +447,6 @@ PatchMap::poolRoughness(const std::vector<Measurement>& measurements)
   }
   const double floor = options_.s3_floor_per_m2 * options_.s3_floor_per_m2;
   squared_roughness_ = weight > 0.0 ? std::max(floor, excess / weight) : floor;
-}
-
-double
-PatchMap::roughnessOf(const MapPatch& patch) const
-{
-  const double w = patch.chi2_per_roughness;
-  double squared = squared_roughness_;
-  if (w > 0.0) {
-    // Patches differ as much as their mean; chi-square scatters by twice its own.
-    const double prior = squared * squared;
-    const double scatter = 2.0 * std::max(patch.chi2_expected, 1.0) / (w * w);
-    const double gain = prior / (prior + scatter);
-    squared += gain * ((patch.chi2 - patch.chi2_expected) / w - squared);
-  }
-  return std::max(options_.s3_floor_per_m2, std::sqrt(std::max(squared, 0.0)));
 }
 
 void

@@ -50,7 +50,10 @@ public:
     return value_;
   }
 
-  JetMatrix covariance() const;
+  JetMatrix covariance() const
+  {
+    return joint_.matrix().topLeftCorner<6, 6>();
+  }
 
   /// The spot is seen through other pixels: of the pattern this share of each number is
   /// left, and the rest is drawn anew.

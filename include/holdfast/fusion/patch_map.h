@@ -21,7 +21,9 @@
 #include <holdfast/fusion/pattern_reach.h>
 #include <holdfast/sensor/camera.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -42,10 +44,10 @@ struct PatchMapOptions {
   /// curvature times distance) gets a patch of its own: the paraboloid about one axis
   /// is none about the other.
   double max_tilt_rad = 0.1;
-  /// A measurement whose normal is uncertain by more than this over the tangent of the
-  /// angle it is seen under tells too little to be fused: at a graze the covariance
-  /// that comes with it follows its own error, and what errs to the one side would
-  /// count more than what errs to the other.
+  /// A measurement whose normal is uncertain by more than this times the cosine of the
+  /// angle it is seen under tells too little to be fused: the covariance that comes
+  /// with it follows its own error, and what errs to the one side would count more than
+  /// what errs to the other (`experiment map`: NEES/dof by sigma of the slope).
   double max_uncertainty_rad = 0.05;
   /// Root mean square third derivative that every surface is granted, 1/m^2, and how
   /// large it may become before a misfit (chi2 over twice its expectation) makes a
@@ -200,7 +202,19 @@ public:
   /// Root mean square third derivative of a patch, 1/m^2, as the misfits of all its
   /// views tell it, as far as they do: of a single view that is next to nothing, and
   /// what is taken is that of the whole map.
-  double roughnessOf(const MapPatch& patch) const;
+  double roughnessOf(const MapPatch& patch) const
+  {
+    const double w = patch.chi2_per_roughness;
+    double squared = squared_roughness_;
+    if (w > 0.0) {
+      // Patches differ as much as their mean; chi-square scatters by twice its own.
+      const double prior = squared * squared;
+      const double scatter = 2.0 * std::max(patch.chi2_expected, 1.0) / (w * w);
+      const double gain = prior / (prior + scatter);
+      squared += gain * ((patch.chi2 - patch.chi2_expected) / w - squared);
+    }
+    return std::max(options_.s3_floor_per_m2, std::sqrt(std::max(squared, 0.0)));
+  }
 
   /// True where a patch's anchor is nearer to a place of the map's frame than this, m;
   /// at most options().radius_m.

@@ -17,8 +17,10 @@ struct RegistrationOptions {
   /// Mahalanobis distance of its six numbers); then the map's gate decides whether it
   /// counts.
   double robust_distance = 4.0;
-  /// Iterations stop when a step moves no part of the pose by more, in its own sigmas.
-  double step_tolerance_sigma = 1e-3;
+  /// Iterations stop when a step is no longer than this many sigmas: with a thirtieth
+  /// the error grows by a thousandth, and pairs that come and go at the gate do not
+  /// keep them going.
+  double step_tolerance_sigma = 0.03;
   /// Directions of the pose (scaled to the sensor's distance from the patches) whose
   /// information is below this share of the largest are not observable: flat ground
   /// tells nothing of x, y and yaw. They stay as the guess has them.
