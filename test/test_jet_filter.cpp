@@ -254,7 +254,9 @@ TEST(JetFilter, StillCameraKeepsItsPattern)
 {
   const PatchEstimator estimator(test::paraboloidOptions());
   const Scene scene = test::reliefScene();
-  NoisePattern white_in_space{{{0.4, 0.2, PatternShape::Gaussian}}};
+  const double share =
+      std::sqrt(0.7) * StereoNoiseModel::Parameters{}.sigma_disparity_px;
+  const NoisePattern white_in_space{{{share, 0.2, PatternShape::Gaussian}}};
   for (const NoisePattern& pattern : {white_in_space, test::kinectPattern()}) {
     constexpr int kTrials = 150, kFrames = 30;
     Sensor sensor = test::kinect();

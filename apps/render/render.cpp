@@ -144,10 +144,30 @@ evenShare(const std::vector<ExtractedPatch>& patches, std::size_t count)
   return share;
 }
 
+/// A map has no cloud: what it has seen is drawn as its surfaces are.
+Subject
+mapSubject(const PatchReport& report)
+{
+  constexpr double kSpacing = 0.01; // m
+  Subject subject;
+  for (const ExtractedPatch& patch : report.result.patches) {
+    const Mesh mesh = tessellate(patch.fit.patch, kSpacing);
+    subject.points.positions.insert(subject.points.positions.end(),
+                                    mesh.vertices.begin(),
+                                    mesh.vertices.end());
+  }
+  subject.patches = report.result.patches;
+  subject.title = fmt::format("{}, {} patches", report.cloud, subject.patches.size());
+  subject.seen = false;
+  return subject;
+}
+
 Subject
 loadSubject(const std::string& result, const RenderSettings& settings)
 {
   const PatchReport report = readResult(result);
+  if (report.is_of_map && settings.cloud.empty())
+    return mapSubject(report);
   const std::string path =
       settings.cloud.empty() ? findCloud(result, report.cloud) : settings.cloud;
   const Sensor sensor = loadSensorOption(settings.input.sensor_name);

@@ -775,6 +775,8 @@ writeJson(std::ostream& out, const PatchReport& report, JsonLayout layout)
   member("holdfast", HOLDFAST_VERSION);
   member("schema", kSchema);
   member("cloud", report.cloud);
+  if (report.map)
+    member("is_map", true);
   if (report.timestamp_us)
     member("timestamp_us", *report.timestamp_us);
   if (report.file)
@@ -800,6 +802,7 @@ readJson(const std::string& text)
     requireKnownSchema(json);
     PatchReport report;
     report.cloud = json.at("cloud");
+    report.is_of_map = json.value("is_map", false);
     const double containment =
         json.at("options").value("containment", FitOptions{}.containment);
     if (!(containment > 0.0 && containment < 1.0))

@@ -29,6 +29,7 @@ struct PatchReport {
   /// The map whose patches those of the result are, one by one; null: they are of one
   /// cloud. Each then says under "map" what the map knows of it.
   const PatchMap* map = nullptr;
+  bool is_of_map = false; ///< as read from a file: no cloud belongs to the patches
   double load_ms = 0.0;
   double fit_ms = 0.0;
 };
