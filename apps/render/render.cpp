@@ -78,7 +78,16 @@ readResult(const std::string& path)
     PatchReport report = readJson(text);
     if (report.result.patches.empty())
       throw std::runtime_error("has no patch");
-    for (const ExtractedPatch& patch : report.result.patches)
+    // A map has patches that cannot be drawn, and says which.
+    std::vector<ExtractedPatch>& patches = report.result.patches;
+    if (report.is_of_map)
+      patches.erase(std::remove_if(patches.begin(),
+                                   patches.end(),
+                                   [](const ExtractedPatch& patch) {
+                                     return !isUsable(patch.fit.status);
+                                   }),
+                    patches.end());
+    for (const ExtractedPatch& patch : patches)
       if (const std::string error = validityError(patch.fit.patch); !error.empty())
         throw std::runtime_error("has an impossible patch: " + error);
     return report;

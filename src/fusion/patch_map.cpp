@@ -87,15 +87,18 @@ isFit(const Measurement& m)
          (m.jet.covariance().diagonal().array() > 0.0).all();
 }
 
-/// How far from linear a measurement is in the noise: its normal's uncertainty over the
-/// cosine it is seen under, which is the relative change of its covariance with an
-/// error of one sigma at a graze, and the slope itself where it is seen straight.
+/// How far from linear a measurement is in the noise: its normal's uncertainty times
+/// the tangent of the angle it is seen under, which is the relative change of its
+/// covariance with an error of one sigma; seen straighter than at 35 degrees, that
+/// of 35.
 double
 tiltError(const Measurement& m)
 {
+  constexpr double kLeastTangent = 0.7;
   const double cosine = std::abs(m.anchor.R.col(2).dot(m.anchor.c)) / m.anchor.c.norm();
+  const double tangent = std::sqrt(std::max(0.0, 1.0 - cosine * cosine)) / cosine;
   const JetMatrix P = m.jet.covariance();
-  return std::sqrt(P(1, 1) + P(2, 2)) / cosine;
+  return std::sqrt(P(1, 1) + P(2, 2)) * std::max(tangent, kLeastTangent);
 }
 
 /// Adds the moments of a view, given in its own axes, in the plane of the anchor.

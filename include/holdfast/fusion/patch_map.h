@@ -44,10 +44,11 @@ struct PatchMapOptions {
   /// curvature times distance) gets a patch of its own: the paraboloid about one axis
   /// is none about the other.
   double max_tilt_rad = 0.1;
-  /// A measurement whose normal is uncertain by more than this times the cosine of the
-  /// angle it is seen under tells too little to be fused: the covariance that comes
-  /// with it follows its own error, and what errs to the one side would count more than
-  /// what errs to the other (`experiment map`: NEES/dof by sigma of the slope).
+  /// A measurement whose normal is uncertain by more than this over the tangent of the
+  /// angle it is seen under (at least 35 degrees) tells too little to be fused: the
+  /// covariance that comes with it follows its own error, and what errs to the one side
+  /// would count more than what errs to the other (`experiment map`: NEES/dof by sigma
+  /// of the slope).
   double max_uncertainty_rad = 0.05;
   /// Root mean square third derivative that every surface is granted, 1/m^2, and how
   /// large it may become before a misfit (chi2 over twice its expectation) makes a
