@@ -40,7 +40,7 @@ run . figure5 --trials 5000 --seed 7
 run . neighborhoods --trials 200 --seed 7
 # Patches from many views, poses from patches, and maps of whole walks.
 run . fusion --seed 7
-run . map --seed 7
+run . map --seed 7 --stride 3 --scene boulder_field
 if [[ -n $recordings ]]; then
   ln -s "$recordings" recordings
   run . figure6 --data recordings

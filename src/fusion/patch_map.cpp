@@ -3,6 +3,7 @@
 #include <holdfast/fusion/roughness.h>
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 
 #include <boost/math/distributions/chi_squared.hpp>
@@ -270,6 +271,8 @@ PatchMap::move(const Pose& increment, const JetMatrix& covariance)
   requireValid(covarianceError(covariance));
   const Pose before = pose_;
   pose_ = before * increment;
+  // Rounding would grow from step to step: an inverse is taken as the transpose.
+  pose_.R = Eigen::Quaterniond(pose_.R).normalized().toRotationMatrix();
   // To the axes of the map: delta is in those of the new sensor frame, c of the old.
   JetMatrix T = JetMatrix::Zero();
   T.topLeftCorner<3, 3>() = pose_.R;
