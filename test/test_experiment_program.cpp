@@ -456,9 +456,9 @@ TEST_F(ExperimentProgram, FusionShowsWhatDoesNotAverage)
   EXPECT_EQ(json, shortRun("fusion", {"--threads", "2"}));
   std::map<std::string, double> nees; // case, rule, number of views
   for (const Json& row : json.at("rows"))
-    if (!row.at("nees_per_dof").is_null()) // what is too uncertain is not fused
-      nees[row.at("case").get<std::string>() + "/" + row.at("rule").get<std::string>() +
-           "/" + row.at("views").dump()] = row.at("nees_per_dof");
+    nees[row.at("case").get<std::string>() + "/" + row.at("rule").get<std::string>() +
+         "/" + row.at("views").dump()] = row.at("nees_per_dof");
+  EXPECT_EQ(nees.size(), json.at("rows").size());
   // The mean of twenty has a standard error of 0.13.
   for (const char* row : {"same support/model error/16",
                           "within 1 cm, s3 30/model error/16",
@@ -470,7 +470,11 @@ TEST_F(ExperimentProgram, FusionShowsWhatDoesNotAverage)
   EXPECT_GT(nees.at("within 3 cm, s3 100/neither/64"), 5.0);
   EXPECT_GT(nees.at("2 mrad, 2 mm a view/as if exact/25"), 5.0);
   EXPECT_GT(nees.at("pattern of the xtion/as if independent/30"), 3.0);
-  EXPECT_LT(nees.at("rocks, guess 1 mrad, 1 mm/300 of 500 patches/1"), 3.0);
+  for (const char* ground : {"gentle ground", "rocks"})
+    EXPECT_LT(
+        nees.at(std::string(ground) + ", guess 1 mrad, 1 mm/300 of 500 patches/1"),
+        3.0)
+        << ground;
 }
 
 TEST_F(ExperimentProgram, MapWalksThroughAScene)
@@ -506,7 +510,7 @@ TEST_F(ExperimentProgram, MapWalksThroughAScene)
     else if (of.find("view") != std::string::npos || of == "16 or more")
       patches += row.at("patches").get<int>();
   }
-  EXPECT_GT(all, 30);
+  EXPECT_GT(all, 100);
   EXPECT_EQ(patches, all);
 }
 

@@ -52,6 +52,21 @@ protected:
     return folder_ + "/" + name;
   }
 
+  /// One line that has the word in it, and no file but those from before.
+  void expectFailure(const Names& arguments,
+                     int code,
+                     const std::string& word,
+                     const Names& before) const
+  {
+    const test::ProgramRun run = simulate(arguments);
+    SCOPED_TRACE(run.err);
+    EXPECT_EQ(run.exit_code, code);
+    EXPECT_EQ(run.errorLines(), 1);
+    EXPECT_EQ(run.out, "");
+    EXPECT_NE(run.err.find(word), std::string::npos) << word;
+    EXPECT_EQ(test::filesIn(folder_), before);
+  }
+
   std::string folder_;
   std::string out_;
 };
@@ -315,20 +330,10 @@ TEST_F(SimulateTrajectory, FailsWithOneLineAndNoFolder)
       {{"--trajectory", folder_ + "/none.txt"}, 1, "none.txt: no such file"},
       {{"--trajectory", sky}, 1, "pose 1"},
   };
-  const auto expectFailure =
-      [&](const Names& arguments, int code, const std::string& word) {
-        const test::ProgramRun run = simulate(arguments);
-        SCOPED_TRACE(run.err);
-        EXPECT_EQ(run.exit_code, code);
-        EXPECT_EQ(run.errorLines(), 1);
-        EXPECT_EQ(run.out, "");
-        EXPECT_NE(run.err.find(word), std::string::npos) << word;
-        EXPECT_EQ(test::filesIn(folder_), before);
-      };
   for (const Case& c : cases) {
     Names arguments{"rocks", "-o", out_, "--stride", "16"};
     arguments.insert(arguments.end(), c.arguments.begin(), c.arguments.end());
-    expectFailure(arguments, c.exit_code, c.word);
+    expectFailure(arguments, c.exit_code, c.word, before);
   }
   const Names walk{"rocks", "--trajectory", "walk", "--stride", "16", "-o"};
   const auto into = [&](const std::string& output) {
@@ -336,10 +341,13 @@ TEST_F(SimulateTrajectory, FailsWithOneLineAndNoFolder)
     arguments.push_back(output);
     return arguments;
   };
-  expectFailure(into(out_ + ".pcd"), 2, "--output");
-  expectFailure(into(folder_ + "/full"), 1, "full: is a folder with files in it");
-  expectFailure(into(folder_ + "/one.txt"), 1, "one.txt: is there already");
-  expectFailure(into(folder_ + "/none/out"), 1, "none/out: cannot be written");
+  expectFailure(into(out_ + ".pcd"), 2, "--output", before);
+  expectFailure(into(folder_ + "/full"),
+                1,
+                "full: is a folder with files in it",
+                before);
+  expectFailure(into(folder_ + "/one.txt"), 1, "one.txt: is there already", before);
+  expectFailure(into(folder_ + "/none/out"), 1, "none/out: cannot be written", before);
   EXPECT_EQ(test::filesIn(folder_ + "/full"), Names{"mine"});
 }
 

@@ -19,7 +19,6 @@
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
-#include <algorithm>
 #include <fstream>
 #include <iostream>
 #include <memory>
@@ -160,14 +159,8 @@ LiveSession::LiveSession(const LiveSettings& settings, Openni2Grabber& grabber)
     throw std::runtime_error("frames of " + error);
   if (!settings.output_folder.empty())
     makeFrameFolder(settings.output_folder);
-  if (!settings.map_files.empty()) {
-    MappingOptions options;
-    options.extraction = settings.extraction.options;
-    options.map.radius_m = options.extraction.sampler.radius_m;
-    options.map.min_radius_m = std::min(options.map.min_radius_m, options.map.radius_m);
-    options.map = mapOptionsFor(sensor_, options.map);
-    mapper_.emplace(sensor_, options);
-  }
+  if (!settings.map_files.empty())
+    mapper_.emplace(sensor_, mappingOptionsFor(sensor_, settings.extraction.options));
   if (settings.view)
     view_.emplace();
   if (!settings.json_path.empty())
@@ -202,6 +195,7 @@ LiveSession::finish()
            sensor_,
            settings_.extraction.options,
            fmt::format("map of {} frames", map.frames()),
+           fitsOf(map, settings_.extraction.options.fit),
            {settings_.map_files, ""});
   if (!settings_.run.quiet && lost_frames_ > 0)
     printNotice(fmt::format("{} frames are not in the map: their pose was not found",
@@ -273,31 +267,8 @@ runLive(const CLI::App& command, LiveSettings& settings)
 }
 
 void
-addLiveOptions(CLI::App& command, LiveSettings& settings)
+addOutputOptions(CLI::App& command, LiveSettings& settings)
 {
-  addDeviceOptions(command, settings.device);
-  addSensorOption(command, settings.sensor_name);
-  addNoPatternOption(command, settings.no_pattern);
-  addExtractionOptions(command, settings.extraction);
-  SamplerOptions& sampler = settings.extraction.options.sampler;
-  sampler.max_patches = kDefaultPatches;
-  command.get_option("--max-patches")->default_str(std::to_string(kDefaultPatches));
-  command
-      .add_option("--seeds",
-                  sampler.max_seeds,
-                  "Most seeds a frame; default: three for every patch")
-      ->check(CLI::Range(1, 100000000, "N"))
-      ->type_name("")
-      ->group("Seeds and neighbourhoods");
-  command
-      .add_option("--budget-ms",
-                  settings.budget_ms,
-                  "Start no new patch when a frame has taken so long, milliseconds")
-      ->check(positiveNumber("MS"))
-      ->type_name("")
-      ->capture_default_str()
-      ->group("Seeds and neighbourhoods");
-  addRunOptions(command, settings.run);
   command
       .add_option("--record",
                   settings.record_path,
@@ -333,6 +304,35 @@ addLiveOptions(CLI::App& command, LiveSettings& settings)
                 "Show points and patches in a window, coloured by the uncertainty of "
                 "their normals")
       ->group("Output");
+}
+
+void
+addLiveOptions(CLI::App& command, LiveSettings& settings)
+{
+  addDeviceOptions(command, settings.device);
+  addSensorOption(command, settings.sensor_name);
+  addNoPatternOption(command, settings.no_pattern);
+  addExtractionOptions(command, settings.extraction);
+  SamplerOptions& sampler = settings.extraction.options.sampler;
+  sampler.max_patches = kDefaultPatches;
+  command.get_option("--max-patches")->default_str(std::to_string(kDefaultPatches));
+  command
+      .add_option("--seeds",
+                  sampler.max_seeds,
+                  "Most seeds a frame; default: three for every patch")
+      ->check(CLI::Range(1, 100000000, "N"))
+      ->type_name("")
+      ->group("Seeds and neighbourhoods");
+  command
+      .add_option("--budget-ms",
+                  settings.budget_ms,
+                  "Start no new patch when a frame has taken so long, milliseconds")
+      ->check(positiveNumber("MS"))
+      ->type_name("")
+      ->capture_default_str()
+      ->group("Seeds and neighbourhoods");
+  addRunOptions(command, settings.run);
+  addOutputOptions(command, settings);
   tidyHelp(command);
 }
 

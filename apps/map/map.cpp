@@ -124,11 +124,8 @@ private:
 
   void start(const std::vector<Pose>& poses)
   {
-    MappingOptions options;
-    options.extraction = settings_.extraction.options;
-    options.map.radius_m = options.extraction.sampler.radius_m;
-    options.map.min_radius_m = std::min(options.map.min_radius_m, options.map.radius_m);
-    options.map = mapOptionsFor(sensor_, options.map);
+    const MappingOptions options =
+        mappingOptionsFor(sensor_, settings_.extraction.options);
     if (settings_.resume.empty()) {
       PatchMap::Snapshot empty;
       empty.options = options.map;
@@ -214,18 +211,16 @@ runMap(const CLI::App& command, MapSettings& settings)
   Mapping mapping(settings, settings.no_pattern ? withoutPattern(named) : named);
   mapping.run(frames);
   const ExtractionOptions& options = settings.extraction.options;
+  const std::vector<FitResult> fits = fitsOf(mapping.map(), options.fit);
   if (!settings.quiet)
-    std::cout << mapTable(mapping.map(),
-                          fitsOf(mapping.map(), options.fit),
-                          mapping.singleSigmas())
-              << std::flush;
+    std::cout << mapTable(mapping.map(), fits, mapping.singleSigmas()) << std::flush;
   if (mapping.map().patches().empty())
     throw std::runtime_error("no patch in any of the frames: no map is written");
   const std::string name = fmt::format("map of {} frames, {} to {}",
                                        frames.size(),
                                        fs::path(frames.front()).filename().string(),
                                        fs::path(frames.back()).filename().string());
-  writeMap(mapping.map(), mapping.sensor(), options, name, settings.output);
+  writeMap(mapping.map(), mapping.sensor(), options, name, fits, settings.output);
   return 0;
 }
 

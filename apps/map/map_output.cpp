@@ -22,7 +22,8 @@ PatchReport
 reportOf(const PatchMap& map,
          const Sensor& sensor,
          const ExtractionOptions& options,
-         const std::string& name)
+         const std::string& name,
+         const std::vector<FitResult>& fits)
 {
   PatchReport report;
   report.cloud = name;
@@ -30,7 +31,6 @@ reportOf(const PatchMap& map,
   report.options = options;
   report.result.sensor = sensor;
   report.map = &map;
-  const std::vector<FitResult> fits = fitsOf(map, options.fit);
   for (std::size_t i = 0; i < fits.size(); ++i) {
     ExtractedPatch patch;
     patch.fit = fits[i];
@@ -62,9 +62,10 @@ writeMap(const PatchMap& map,
          const Sensor& sensor,
          const ExtractionOptions& options,
          const std::string& name,
+         const std::vector<FitResult>& fits,
          const MapOutput& output)
 {
-  const PatchReport report = reportOf(map, sensor, options, name);
+  const PatchReport report = reportOf(map, sensor, options, name, fits);
   std::vector<std::unique_ptr<AtomicFile>> files;
   std::vector<AtomicFile*> pointers;
   const auto open = [&](const std::string& path) -> std::ostream& {

@@ -23,11 +23,13 @@ std::vector<FitResult> fitsOf(const PatchMap& map, const FitOptions& options);
 
 /// Writes all files or none.
 /// \param name of what the map was made from.
+/// \param fits of its patches, as fitsOf().
 /// \throw std::runtime_error "PATH: cause".
 void writeMap(const PatchMap& map,
               const Sensor& sensor,
               const ExtractionOptions& options,
               const std::string& name,
+              const std::vector<FitResult>& fits,
               const MapOutput& output);
 
 } // namespace holdfast::app

@@ -78,17 +78,9 @@ readResult(const std::string& path)
     PatchReport report = readJson(text);
     if (report.result.patches.empty())
       throw std::runtime_error("has no patch");
-    // A map has patches that cannot be drawn, and says which.
-    std::vector<ExtractedPatch>& patches = report.result.patches;
-    if (report.is_of_map)
-      patches.erase(std::remove_if(patches.begin(),
-                                   patches.end(),
-                                   [](const ExtractedPatch& patch) {
-                                     return !isUsable(patch.fit.status);
-                                   }),
-                    patches.end());
-    for (const ExtractedPatch& patch : patches)
-      if (const std::string error = validityError(patch.fit.patch); !error.empty())
+    for (const ExtractedPatch& patch : report.result.patches)
+      if (const std::string error = validityError(patch.fit.patch);
+          !error.empty() && !(report.is_of_map && !isUsable(patch.fit.status)))
         throw std::runtime_error("has an impossible patch: " + error);
     return report;
   }
@@ -153,21 +145,45 @@ evenShare(const std::vector<ExtractedPatch>& patches, std::size_t count)
   return share;
 }
 
+/// Those that are to be drawn. What a map knows too little of to be a patch cannot be,
+/// which is said.
+std::vector<ExtractedPatch>
+patchesOf(const std::string& result,
+          const PatchReport& report,
+          const RenderSettings& settings)
+{
+  std::vector<ExtractedPatch> patches = report.result.patches;
+  if (report.is_of_map) {
+    const auto end =
+        std::remove_if(patches.begin(), patches.end(), [](const ExtractedPatch& patch) {
+          return !isUsable(patch.fit.status);
+        });
+    if (end != patches.end() && !settings.quiet)
+      printNotice(fmt::format(
+          "{}: {} patches are not drawn, since the map knows too little of them",
+          result,
+          patches.end() - end));
+    patches.erase(end, patches.end());
+  }
+  return settings.max_patches ?
+             evenShare(patches, static_cast<std::size_t>(*settings.max_patches)) :
+             patches;
+}
+
 /// A map has no cloud: what it has seen is drawn as its surfaces are.
 Subject
-mapSubject(const PatchReport& report)
+mapSubject(const std::string& name, std::vector<ExtractedPatch> patches)
 {
   constexpr double kSpacing = 0.01; // m
   Subject subject;
-  for (const ExtractedPatch& patch : report.result.patches) {
+  for (const ExtractedPatch& patch : patches) {
     const Mesh mesh = tessellate(patch.fit.patch, kSpacing);
     subject.points.positions.insert(subject.points.positions.end(),
                                     mesh.vertices.begin(),
                                     mesh.vertices.end());
   }
-  subject.patches = report.result.patches;
-  subject.title = fmt::format("{}, {} patches", report.cloud, subject.patches.size());
-  subject.seen = false;
+  subject.title = fmt::format("{}, {} patches", name, patches.size());
+  subject.patches = std::move(patches);
   return subject;
 }
 
@@ -175,8 +191,9 @@ Subject
 loadSubject(const std::string& result, const RenderSettings& settings)
 {
   const PatchReport report = readResult(result);
+  std::vector<ExtractedPatch> patches = patchesOf(result, report, settings);
   if (report.is_of_map && settings.cloud.empty())
-    return mapSubject(report);
+    return mapSubject(report.cloud, std::move(patches));
   const std::string path =
       settings.cloud.empty() ? findCloud(result, report.cloud) : settings.cloud;
   const Sensor sensor = loadSensorOption(settings.input.sensor_name);
@@ -192,10 +209,7 @@ loadSubject(const std::string& result, const RenderSettings& settings)
       printNotice(path + ": " + notice);
 
   Subject subject;
-  subject.patches = report.result.patches;
-  if (settings.max_patches)
-    subject.patches =
-        evenShare(subject.patches, static_cast<std::size_t>(*settings.max_patches));
+  subject.patches = std::move(patches);
   subject.title = fmt::format("{}, {} {}",
                               fs::path(path).filename().string(),
                               subject.patches.size(),

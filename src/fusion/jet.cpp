@@ -2,7 +2,7 @@
 
 #include "taylor.h"
 
-#include <holdfast/geometry/rotation.h>
+#include <holdfast/geometry/gaussian.h>
 
 #include <array>
 #include <cmath>
@@ -163,12 +163,6 @@ bySurface(const Solution& s, const Eigen::Matrix3d& R)
   return J;
 }
 
-JetMatrix
-symmetric(const JetMatrix& S)
-{
-  return 0.5 * (S + S.transpose());
-}
-
 } // namespace
 
 JetVector
@@ -203,10 +197,10 @@ jetAt(const FitResult& fit, const Pose& anchor, const ThirdToJet& by_third)
       bySurface(*solved, own.R) * surfaceByState(fit.state.type);
   Jet jet;
   jet.value = solved->jetOf(solved->h);
-  const JetMatrix all = symmetric(J * fit.state_covariance * J.transpose());
+  const JetMatrix all = symmetrized(J * fit.state_covariance * J.transpose());
   jet.white = all;
   if (fit.white_state_covariance->size() > 0) {
-    jet.white = symmetric(J * *fit.white_state_covariance * J.transpose());
+    jet.white = symmetrized(J * *fit.white_state_covariance * J.transpose());
     jet.pattern = all - jet.white;
   }
   return jet;
@@ -250,8 +244,8 @@ transported(const Jet& jet,
     return std::nullopt;
   const JetMatrix& F = moved->by_jet;
   return Jet{moved->value,
-             symmetric(F * jet.white * F.transpose()),
-             symmetric(F * jet.pattern * F.transpose())};
+             symmetrized(F * jet.white * F.transpose()),
+             symmetrized(F * jet.pattern * F.transpose())};
 }
 
 JetMatrix

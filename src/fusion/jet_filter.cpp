@@ -82,16 +82,19 @@ JetFilter::distance(const JetVector& jet, const JetMatrix& white) const
 }
 
 bool
-JetFilter::update(const JetVector& jet, const JetMatrix& white)
+JetFilter::update(const JetVector& jet, const JetMatrix& white, double gate)
 {
   const Joint P = joint_.matrix();
   const Eigen::LLT<JetMatrix> S(innovation(P, white));
   if (S.info() != Eigen::Success)
     return false;
+  const JetVector r = S.matrixL().solve(jet - value_ - pattern_);
+  // Written so that NaN is far, too.
+  if (!(r.squaredNorm() <= gate))
+    return false;
   // With S = L L^T and V = L^-1 [I I] P: P - V^T V, and a gain of V^T L^-1.
   const Eigen::Matrix<double, 6, 12> V =
       S.matrixL().solve(P.topRows<6>() + P.bottomRows<6>());
-  const JetVector r = S.matrixL().solve(jet - value_ - pattern_);
   const Eigen::Matrix<double, 12, 1> step = V.transpose() * r;
   const Joint updated = P - V.transpose() * V;
   if (!step.allFinite() || !updated.allFinite())

@@ -51,7 +51,7 @@ surfaceOf(const JetVector& jet, const Pose& anchor)
   auto& J = surface.by_jet;
   J.setZero();
   J.col(0).tail<3>() = anchor.R.col(2);
-  const double h_xx = 1.0 / s;
+  const double inverse_s = 1.0 / s;
   const int row[3] = {0, 0, 1}, column[3] = {0, 1, 1};
   // The normal turns by dn = -(dg, 0)/s - n ds/s = nu_y e_1 - nu_x e_2.
   for (int a = 0; a < 2; ++a) {
@@ -69,7 +69,7 @@ surfaceOf(const JetVector& jet, const Pose& anchor)
   for (int b = 0; b < 3; ++b) {
     Eigen::Matrix2d dH = Eigen::Matrix2d::Zero();
     dH(row[b], column[b]) = dH(column[b], row[b]) = 1.0;
-    const Eigen::Matrix2d dK = h_xx * (e.transpose() * dH * e);
+    const Eigen::Matrix2d dK = inverse_s * (e.transpose() * dH * e);
     J.col(3 + b).head<3>() << dK(0, 0), dK(0, 1), dK(1, 1);
   }
   return surface;

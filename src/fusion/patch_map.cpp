@@ -1,8 +1,9 @@
 #include <holdfast/fusion/patch_map.h>
 
+#include "geometry/symmetric.h"
 #include <holdfast/fusion/roughness.h>
+#include <holdfast/geometry/gaussian.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
@@ -54,8 +55,7 @@ covarianceError(const JetMatrix& S)
     return "the covariance of a pose must not be zero: nobody knows one exactly";
   if (!S.isApprox(S.transpose(), kRounding))
     return "the covariance of a pose must be symmetric";
-  const Eigen::SelfAdjointEigenSolver<JetMatrix> solver(S, Eigen::EigenvaluesOnly);
-  if (solver.eigenvalues()[0] < -kRounding * solver.eigenvalues()[5])
+  if (!isPositiveSemiDefinite(S, kRounding))
     return "the covariance of a pose must be positive semi-definite";
   return "";
 }
@@ -125,11 +125,8 @@ addMoments(const Measurement& m, const Pose& in_anchor, std::array<float, 6>& su
 Eigen::Matrix3d
 turnedMoments(const Eigen::Matrix3d& S, const Pose& in_anchor)
 {
-  const double a = in_anchor.R(0, 0), b = in_anchor.R(0, 1), c = in_anchor.R(1, 0),
-               d = in_anchor.R(1, 1);
-  Eigen::Matrix3d T;
-  T << a * a, 2.0 * a * b, b * b, a * c, a * d + b * c, b * d, c * c, 2.0 * c * d,
-      d * d;
+  const Eigen::Matrix3d T =
+      symmetric::planeTurn(Eigen::Matrix2d(in_anchor.R.topLeftCorner<2, 2>()));
   return T * S * T.transpose();
 }
 
@@ -183,6 +180,14 @@ addView(const Measurement& m, const Pose& anchor, MapPatch& patch)
   patch.conflicts = 0;
 }
 
+/// Of two patches of one place: its height is less sure; of equals the younger.
+bool
+isWorse(const MapPatch& patch, const MapPatch& other)
+{
+  const double a = patch.jet.covariance()(0, 0), b = other.jet.covariance()(0, 0);
+  return std::pair(a, patch.id) > std::pair(b, other.id);
+}
+
 } // namespace
 
 std::string
@@ -231,6 +236,7 @@ PatchMap::PatchMap(const PatchMapOptions& options) : options_(options)
   requireValid(validityError(options));
   gate_ = boost::math::quantile(
       boost::math::complement(boost::math::chi_squared(6.0), options.gate_level));
+  smallest_cosine_ = std::cos(options.max_normal_angle_rad);
   rebuild();
   poolRoughness({});
 }
@@ -336,16 +342,21 @@ PatchMap::reach() const
   return options_.association_radius * options_.radius_m;
 }
 
+bool
+PatchMap::isFacingAs(const MapPatch& patch, const Pose& anchor) const
+{
+  return patch.anchor.R.col(2).dot(anchor.R.col(2)) > smallest_cosine_;
+}
+
 void
 PatchMap::listCandidates(const Pose& anchor, std::uint64_t asked_by)
 {
   candidates_.clear();
   const double largest = reach();
-  const double cosine = std::cos(options_.max_normal_angle_rad);
   visitNear(anchor.c, [&](int i) {
     const MapPatch& patch = patches_[static_cast<std::size_t>(i)];
     const double distance = (patch.anchor.c - anchor.c).norm();
-    if (distance < largest && patch.anchor.R.col(2).dot(anchor.R.col(2)) > cosine)
+    if (distance < largest && isFacingAs(patch, anchor))
       candidates_.push_back({i, patch.id == asked_by ? -1.0 : distance});
   });
   // The one that asked first, then by distance; of equals the older.
@@ -373,13 +384,12 @@ PatchMap::nearest(const Measurement& measurement,
                   double reach_m) const
 {
   const Pose anchor = sensor * measurement.anchor;
-  const double cosine = std::cos(options_.max_normal_angle_rad);
   const MapPatch* best = nullptr;
   double least = reach_m > 0.0 ? reach_m : reach();
   visitWithin(anchor.c, least, [&](int i) {
     const MapPatch& patch = patches_[static_cast<std::size_t>(i)];
     const double distance = (patch.anchor.c - anchor.c).norm();
-    if (distance < least && patch.anchor.R.col(2).dot(anchor.R.col(2)) > cosine) {
+    if (distance < least && isFacingAs(patch, anchor)) {
       least = distance;
       best = &patch;
     }
@@ -442,10 +452,8 @@ PatchMap::poolRoughness(const std::vector<Measurement>& measurements)
     weight += patch.chi2_per_roughness;
   }
   // In the order of their ids, as everything.
-  for (const int i : order_) {
-    if (measurements.empty())
-      break;
-    const Measurement& m = measurements[static_cast<std::size_t>(i)];
+  for (std::size_t i = 0; i < measurements.size(); ++i) {
+    const Measurement& m = measurements[static_cast<std::size_t>(order_[i])];
     if (!isFit(m))
       continue;
     excess += m.chi2 - m.chi2_expected;
@@ -527,8 +535,7 @@ PatchMap::fuse(const Measurement& m, const Pose& anchor, MapPatch& patch) const
         kept.cwiseQuotient(patch.epoch_kept.cast<double>().cwiseMax(1e-9));
     filter.changePattern(byOrder(step), jet->pattern);
   }
-  if (!(filter.distance(jet->value, white) <= gate_) ||
-      !filter.update(jet->value, white))
+  if (!filter.update(jet->value, white, gate_))
     return false;
   patch.jet = filter;
   if (is_new_epoch) {
@@ -590,13 +597,8 @@ PatchMap::conflict(MapPatch& patch, const Measurement* m, UpdateReport& report)
     ++report.forgotten;
     return;
   }
-  const std::uint64_t id = next_id_++;
-  const Pose anchor = pose_ * m->anchor;
   patch.radius_m = 0.0;
-  patches_.emplace_back();
-  patches_.back().id = id;
-  restart(*m, anchor, options_.radius_m, patches_.back());
-  insert(static_cast<int>(patches_.size()) - 1);
+  bear(*m, pose_ * m->anchor);
   ++report.replaced;
 }
 
@@ -612,13 +614,6 @@ PatchMap::split(UpdateReport& report)
       patch.restarts = true;
       ++report.split;
     }
-}
-
-bool
-PatchMap::isWorse(const MapPatch& patch, const MapPatch& other) const
-{
-  const double a = patch.jet.covariance()(0, 0), b = other.jet.covariance()(0, 0);
-  return std::pair(a, patch.id) > std::pair(b, other.id);
 }
 
 void

@@ -6,11 +6,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
-#include <boost/math/distributions/chi_squared.hpp>
-
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 
 namespace holdfast {
@@ -188,13 +185,6 @@ leverOf(const std::vector<Measurement>& measurements)
   return std::sqrt(squared / static_cast<double>(measurements.size()));
 }
 
-double
-gateOf(const PatchMapOptions& options)
-{
-  return boost::math::quantile(
-      boost::math::complement(boost::math::chi_squared(6.0), options.gate_level));
-}
-
 /// Huber: what is far pulls as strongly as what is at the limit.
 double
 robustWeight(double squared_distance, double limit)
@@ -207,7 +197,6 @@ robustWeight(double squared_distance, double limit)
 NormalEquations
 equationsAt(const std::vector<Measurement>& measurements,
             const PatchMap& map,
-            double gate,
             double reach_m,
             std::optional<double> robust_distance,
             RegistrationResult& result)
@@ -217,7 +206,7 @@ equationsAt(const std::vector<Measurement>& measurements,
   result.chi2 = 0.0;
   for (const Pair& pair :
        pairsAt(measurements, map, result.pose, reach_m, result.unmatched)) {
-    if (!robust_distance && pair.distance > gate) {
+    if (!robust_distance && pair.distance > map.gate()) {
       ++result.gated;
       continue;
     }
@@ -243,7 +232,7 @@ registerPatches(const std::vector<Measurement>& measurements,
   result.unmatched = static_cast<int>(measurements.size());
   if (measurements.empty())
     return result;
-  const double lever = leverOf(measurements), gate = gateOf(map.options());
+  const double lever = leverOf(measurements);
   const auto givenUp = [&](RegistrationStatus status) {
     result.pose = guess;
     result.covariance.setZero();
@@ -259,7 +248,6 @@ registerPatches(const std::vector<Measurement>& measurements,
     NormalEquations equations =
         equationsAt(measurements,
                     map,
-                    gate,
                     reach,
                     is_robust ? std::optional(options.robust_distance) : std::nullopt,
                     result);

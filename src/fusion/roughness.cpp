@@ -1,5 +1,7 @@
 #include <holdfast/fusion/roughness.h>
 
+#include "geometry/symmetric.h"
+
 #include <Eigen/Cholesky>
 
 namespace holdfast {
@@ -34,7 +36,7 @@ shiftOfThird(const Eigen::Vector2d& origin)
 Eigen::Matrix4d
 turnOfThird(const Eigen::Matrix2d& W)
 {
-  // The derivative along three directions, of which e have the second axis.
+  // The derivative along three directions.
   const auto along =
       [](const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
         return Eigen::RowVector4d(
@@ -59,9 +61,7 @@ shiftOfJet(const Eigen::Vector2d& u, const Eigen::Matrix2d& W)
   Eigen::Matrix<double, 2, 6> gradient; // there, old axes
   gradient << 0.0, 1.0, 0.0, s.x(), s.y(), 0.0, 0.0, 0.0, 1.0, 0.0, s.x(), s.y();
   J.middleRows<2>(1) = W * gradient;
-  const double a = W(0, 0), b = W(0, 1), c = W(1, 0), d = W(1, 1);
-  J.bottomRightCorner<3, 3>() << a * a, 2.0 * a * b, b * b, a * c, a * d + b * c, b * d,
-      c * c, 2.0 * c * d, d * d;
+  J.bottomRightCorner<3, 3>() = symmetric::planeTurn(W);
   return J;
 }
 

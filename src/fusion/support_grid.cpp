@@ -54,16 +54,6 @@ SupportGrid::add(const SupportGrid& other,
     }
 }
 
-int
-SupportGrid::count() const
-{
-  int count = 0;
-  for (std::uint16_t row : rows_)
-    for (; row != 0; row &= static_cast<std::uint16_t>(row - 1))
-      ++count;
-  return count;
-}
-
 SupportGrid
 SupportGrid::fromRows(const std::array<std::uint16_t, kCells>& rows)
 {

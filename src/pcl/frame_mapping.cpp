@@ -94,6 +94,17 @@ mapOptionsFor(const Sensor& sensor, PatchMapOptions options)
   return options;
 }
 
+MappingOptions
+mappingOptionsFor(const Sensor& sensor, const ExtractionOptions& extraction)
+{
+  MappingOptions options;
+  options.extraction = extraction;
+  options.map.radius_m = extraction.sampler.radius_m;
+  options.map.min_radius_m = std::min(options.map.min_radius_m, options.map.radius_m);
+  options.map = mapOptionsFor(sensor, options.map);
+  return options;
+}
+
 /// What a frame says.
 struct FrameMapper::Measured {
   std::vector<Measurement> measurements;

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 
 #include <array>
+#include <limits>
 
 namespace holdfast {
 
@@ -71,8 +72,12 @@ public:
   /// \param white of the view, with all that is no pattern.
   double distance(const JetVector& jet, const JetMatrix& white) const;
 
-  /// \return false, and nothing done, when the innovation has no covariance.
-  bool update(const JetVector& jet, const JetMatrix& white);
+  /// \param gate largest distance() of a view that is taken.
+  /// \return false, and nothing done, when it is further, or the innovation has no
+  /// covariance.
+  bool update(const JetVector& jet,
+              const JetMatrix& white,
+              double gate = std::numeric_limits<double>::infinity());
 
   /// [x b] and their covariance, for files.
   const JetVector& patternValue() const

@@ -147,6 +147,12 @@ public:
     return options_;
   }
 
+  /// Squared Mahalanobis distance at which the gate closes: chi-square of six numbers.
+  double gate() const
+  {
+    return gate_;
+  }
+
   /// The sensor moved: `increment` is its new pose in its old frame.
   /// \param covariance of (delta, c), R <- R Exp(delta), c in the axes of the old
   /// frame,
@@ -258,7 +264,7 @@ private:
   void split(UpdateReport& report);
   void merge(UpdateReport& report);
   void forget(UpdateReport& report);
-  bool isWorse(const MapPatch& patch, const MapPatch& other) const;
+  bool isFacingAs(const MapPatch& patch, const Pose& anchor) const;
   double reach() const;
   JetMatrix errorOf(const JetMatrix& covariance,
                     const JetVector& jet,
@@ -277,6 +283,7 @@ private:
 
   PatchMapOptions options_;
   double gate_ = 0.0;
+  double smallest_cosine_ = 0.0; ///< of normals that belong together
   double squared_roughness_ = 0.0; ///< of the whole map
   Pose pose_;
   std::optional<JetMatrix> pose_covariance_; ///< of place(); none: robot-centric

@@ -50,8 +50,6 @@ public:
            const Eigen::Matrix2d& map,
            const Eigen::Vector2d& offset);
 
-  int count() const;
-
   const std::array<std::uint16_t, kCells>& rows() const
   {
     return rows_;

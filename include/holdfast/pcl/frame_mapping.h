@@ -91,4 +91,8 @@ private:
 /// The options of a map for a sensor: how far the errors of its pixels reach.
 PatchMapOptions mapOptionsFor(const Sensor& sensor, PatchMapOptions options = {});
 
+/// The options of a mapper for a sensor: a map of the radius of these neighbourhoods.
+MappingOptions mappingOptionsFor(const Sensor& sensor,
+                                 const ExtractionOptions& extraction);
+
 } // namespace holdfast
