@@ -1,18 +1,12 @@
 #include <holdfast/fusion/roughness.h>
 
 #include "geometry/symmetric.h"
+#include "third_derivatives.h"
 
 #include <Eigen/Cholesky>
 
 namespace holdfast {
 namespace {
-
-/// x^3/6, x^2 y/2, x y^2/2, y^3/6.
-Eigen::Vector4d
-cubicBasis(double x, double y)
-{
-  return {x * x * x / 6.0, x * x * y / 2.0, x * y * y / 2.0, y * y * y / 6.0};
-}
 
 /// The jet at 0 of a cubic's terms of lower degree, once it is written about another
 /// origin u and has lost its cubic terms there.
@@ -30,25 +24,6 @@ shiftOfThird(const Eigen::Vector2d& origin)
        0.0, 0.0, u, v;
   // clang-format on
   return B;
-}
-
-/// Third derivatives in axes that are the columns of W, from those in the old ones.
-Eigen::Matrix4d
-turnOfThird(const Eigen::Matrix2d& W)
-{
-  // The derivative along three directions.
-  const auto along =
-      [](const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
-        return Eigen::RowVector4d(
-            a[0] * b[0] * c[0],
-            a[0] * b[0] * c[1] + a[0] * b[1] * c[0] + a[1] * b[0] * c[0],
-            a[0] * b[1] * c[1] + a[1] * b[0] * c[1] + a[1] * b[1] * c[0],
-            a[1] * b[1] * c[1]);
-      };
-  const Eigen::Vector2d x = W.col(0), y = W.col(1);
-  Eigen::Matrix4d T;
-  T << along(x, x, x), along(x, x, y), along(x, y, y), along(y, y, y);
-  return T;
 }
 
 /// The jet at 0 of a quadric with a jet at u in axes that are the columns of W.

@@ -21,9 +21,10 @@ BEGIN {
   allowed["front"] = uncertainty " uncertainty"
   allowed["validation"] = "geometry patch fit"
   allowed["fusion"] = uncertainty " uncertainty sensor"
+  allowed["contact"] = allowed["fusion"] " fusion"
   allowed["simulation"] = "ground geometry patch sensor"
-  allowed["evaluation"] = allowed["front"] " front validation sensor simulation fusion"
-  allowed["pcl"] = allowed["front"] " front validation sensor fusion"
+  allowed["evaluation"] = allowed["front"] " front validation sensor simulation fusion contact"
+  allowed["pcl"] = allowed["front"] " front validation sensor fusion contact"
   allowed["io"] = allowed["pcl"] " pcl"
   # Headers above the rooms: the front door, and what all may know.
   room["patch_estimator"] = "front"

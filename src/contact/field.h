@@ -1,0 +1,87 @@
+/// \file A surface in the frame of the load, as random numbers.
+#pragma once
+
+#include "contact/sole.h"
+#include <holdfast/contact/contact_risk.h>
+
+#include <Eigen/Core>
+
+#include <optional>
+
+namespace holdfast::contact {
+
+/// [h gx gy | kxx kxy kyy | xxx xxy xyy yyy] of the surface itself, at the load.
+inline constexpr int kField = 10;
+using FieldVector = Eigen::Matrix<double, kField, 1>;
+using FieldMatrix = Eigen::Matrix<double, kField, kField>;
+
+/// Its last numbers are the shape that shows under a sole.
+inline constexpr int kShapeStart = kField - kShape;
+
+/// field = mean + factor * z, z ~ N(0, I).
+struct Field {
+  FieldVector mean;
+  FieldMatrix factor;
+
+  auto shapeMean() const
+  {
+    return mean.tail<kShape>();
+  }
+  auto shapeFactor() const
+  {
+    return factor.bottomRows<kShape>();
+  }
+  Eigen::Matrix2d slopeCovariance() const
+  {
+    const auto rows = factor.middleRows<2>(1);
+    return rows * rows.transpose();
+  }
+};
+
+/// \param load its frame, in that of the surface.
+/// \return nothing where the surface is not seen along the load.
+std::optional<Field> fieldAt(const ContactSurface& surface, const Pose& load);
+
+/// Probability that none of some events happens, by integrating exactly along lines
+/// through quasi-random nodes: what is all right is convex for every one of them, so
+/// that each line has one piece of it.
+class Lines {
+public:
+  static constexpr int kLines = 128;
+
+  explicit Lines(const Field& field);
+
+  /// Sets the direction of all lines: across the limit of an event, where its
+  /// probability would be roughest otherwise.
+  /// \param event coefficients of the field
+  void setDirection(const FieldVector& event);
+
+  /// Drops all limits.
+  void clear();
+
+  /// |rows * shape - own| <= limit for all rows.
+  void keepShape(const ShapeRows& rows, const Eigen::VectorXd& own, double limit);
+  void keepHeight(double limit);
+  /// |slope - centre| <= limit.
+  void keepSlope(const Eigen::Vector2d& centre, double limit);
+  /// |slope| <= friction, drawn anew on every line.
+  void keepFriction(const Friction& friction);
+
+  /// Probability that a limit is exceeded.
+  double outside() const;
+
+private:
+  using Nodes = Eigen::Matrix<double, kField, kLines>;
+  using Row = Eigen::Array<double, 1, kLines>;
+
+  void keepWithin(const Row& middle, double along, double limit);
+  void keepSlopes(const Eigen::Vector2d& centre, const Row& limits);
+
+  const Field& field_;
+  Nodes places_; ///< factor * nodes
+  Nodes starts_; ///< of the lines, in the field
+  FieldVector along_;
+  Row low_, high_;
+};
+
+} // namespace holdfast::contact
