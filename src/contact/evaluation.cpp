@@ -151,37 +151,22 @@ Evaluation::gapOf(const Residuals& extremes, const Eigen::VectorXd& own)
   return std::clamp(lines_->outside(), largest, std::min(sum, 1.0));
 }
 
-FieldVector
-Evaluation::leadingEvent(const ContactEvents& risk, const Residuals& extremes) const
-{
-  const double slope = std::max(risk.slip, risk.tilt);
-  if (risk.gap >= std::max(risk.height, slope)) {
-    Eigen::Index worst = 0;
-    (extremes.mean.cwiseAbs() + 2.0 * extremes.sigma).maxCoeff(&worst);
-    return inField(extremes.rows.row(worst).transpose());
-  }
-  FieldVector event = FieldVector::Unit(0);
-  if (slope > risk.height) {
-    event.setZero();
-    event.segment<2>(1) = field_->mean.segment<2>(1);
-    if (event.isZero(0.0))
-      event[1] = 1.0;
-  }
-  return event;
-}
-
 double
 Evaluation::jointOf(const ContactEvents& risk,
                     const Residuals& extremes,
                     const Eigen::VectorXd& own)
 {
-  const double largest = std::max({risk.slip, risk.height, risk.tilt, risk.gap});
+  const double slope = std::max(risk.slip, risk.tilt);
+  const double largest = std::max({risk.height, risk.gap, slope});
   const double sum = risk.slip + risk.height + risk.tilt + risk.gap;
   double any = sum;
   if (sum - largest > kNegligible) {
     const Foot& foot = sole_.foot();
-    lines_->setDirection(leadingEvent(risk, extremes));
-    lines_->keepShape(extremes.rows, own, foot.tolerances.gap_m);
+    if (risk.gap < largest) { // else the lines are as the gap has left them
+      lines_->setDirection(risk.height == largest ? FieldVector(FieldVector::Unit(0)) :
+                                                    steepest());
+      lines_->keepShape(extremes.rows, own, foot.tolerances.gap_m);
+    }
     lines_->keepHeight(foot.tolerances.height_m);
     lines_->keepFriction(foot.friction);
     if (foot.ankle == Ankle::Stiff)
@@ -189,6 +174,16 @@ Evaluation::jointOf(const ContactEvents& risk,
     any = std::clamp(lines_->outside(), largest, std::min(sum, 1.0));
   }
   return 1.0 - (1.0 - std::min(any, 1.0)) * (1.0 - risk.support);
+}
+
+FieldVector
+Evaluation::steepest() const
+{
+  FieldVector event = FieldVector::Zero();
+  event.segment<2>(1) = field_->mean.segment<2>(1);
+  if (event.isZero(0.0))
+    event[1] = 1.0;
+  return event;
 }
 
 double

@@ -34,10 +34,11 @@ private:
   Residuals residualsOf(const SolePlaces& places, double turn) const;
   void workOutCommon();
   double gapOf(const Residuals& extremes, const Eigen::VectorXd& own);
+  /// After gapOf() of the same residuals.
   double jointOf(const ContactEvents& risk,
                  const Residuals& extremes,
                  const Eigen::VectorXd& own);
-  FieldVector leadingEvent(const ContactEvents& risk, const Residuals& extremes) const;
+  FieldVector steepest() const;
   double areaAt(double turn) const;
   void placeSole(double turn, ContactQuality& quality) const;
 
