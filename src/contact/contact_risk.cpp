@@ -128,7 +128,7 @@ contactRisks(const ContactSurface& surface,
   requireValid(validityError(placement));
   requireValid(yaws >= 1 ? "" : "a foot wants at least one yaw");
   const contact::Sole sole(foot);
-  const contact::Evaluation evaluation(surface, sole, placement);
+  contact::Evaluation evaluation(surface, sole, placement);
   std::vector<ContactRisk> risks;
   for (int i = 0; i < yaws; ++i)
     risks.push_back(evaluation.atYaw(2.0 * kPi * i / yaws));
