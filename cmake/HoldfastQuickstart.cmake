@@ -12,7 +12,7 @@ if(HOLDFAST_QUICKSTART)
 endif()
 
 set(quickstart_without
-  src/simulation/ src/evaluation/ src/fusion/ src/sensor/noise_calibration
+  src/simulation/ src/evaluation/ src/fusion/ src/contact/ src/sensor/noise_calibration
   src/sensor/pattern_calibration
   src/uncertainty/stagewise src/uncertainty/second_order
   src/pcl/frame_extraction src/pcl/frame_mapping src/pcl/map_conversions

@@ -103,6 +103,15 @@ multiply(const Factor& factor, const Lines::Nodes& nodes, Lines::Nodes& result)
   }
 }
 
+/// Whether the load comes from the side that was seen, which is above the plane of the
+/// anchor everywhere.
+bool
+isSeenSide(const JetVector& jet_at_load, const Pose& anchor, const Pose& load)
+{
+  const Eigen::Vector3d against_load(-jet_at_load[1], -jet_at_load[2], 1.0);
+  return anchor.R.col(2).dot(load.R * against_load) > 0.0;
+}
+
 /// Lower triangular root of a positive semi-definite matrix: what is certain has a
 /// column of zeros.
 template <int n>
@@ -134,7 +143,7 @@ fieldAt(const ContactSurface& surface, const Pose& load)
                                               load.inverse() * surface.anchor);
   const std::optional<Jet> jet =
       transported(surface.jet, surface.anchor, load, by_third);
-  if (!jet || !jet->value.allFinite())
+  if (!jet || !jet->value.allFinite() || !isSeenSide(jet->value, surface.anchor, load))
     return std::nullopt;
   static const Eigen::Matrix4d kRoot = semidefiniteRoot(unitThirdDerivatives());
   Field field;

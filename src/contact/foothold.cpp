@@ -1,0 +1,227 @@
+#include <holdfast/contact/foothold.h>
+
+#include "contact/best_yaw.h"
+#include "contact/evaluation.h"
+#include "parallel/parallel_for.h"
+#include <holdfast/geometry/constants.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <stdexcept>
+#include <utility>
+
+namespace holdfast {
+namespace contact {
+namespace {
+
+/// What totals are worked out to: differences below it are rounding, and decide
+/// nothing.
+constexpr double kTotalStep = 1e-6;
+
+double
+stepsOf(const ContactQuality& quality)
+{
+  return std::floor(quality.risk.total / kTotalStep);
+}
+
+} // namespace
+
+bool
+isBetter(const ContactRisk& one, const ContactRisk& other)
+{
+  if (!one.quality || !other.quality)
+    return one.quality.has_value() && !other.quality.has_value();
+  const double a = stepsOf(*one.quality), b = stepsOf(*other.quality);
+  return a != b ? a < b : one.quality->contact_area_m2 > other.quality->contact_area_m2;
+}
+
+ContactRisk
+atBestYaw(const ContactSurface& surface,
+          const Sole& sole,
+          Placement& placement,
+          int yaws)
+{
+  Evaluation evaluation(surface, sole, placement);
+  ContactRisk best;
+  double best_turn = 0.0;
+  for (int i = 0; i < yaws; ++i) {
+    const double turn = 2.0 * kPi * i / yaws;
+    ContactRisk risk = evaluation.atYaw(turn);
+    // Without enough support, the share that is nearest to it says most.
+    const bool is_nearer =
+        !risk.quality && !best.quality && risk.support_share > best.support_share;
+    if (i == 0 || is_nearer || isBetter(risk, best)) {
+      best = std::move(risk);
+      best_turn = turn;
+    }
+  }
+  placement.yaw += best_turn;
+  return best;
+}
+
+} // namespace contact
+
+namespace {
+
+void
+requireValid(const std::string& error)
+{
+  if (!error.empty())
+    throw std::invalid_argument("holdfast::rankFootholds: " + error);
+}
+
+/// Distance of the farthest cell that was hit from the middle of all, m.
+double
+supportReach(const MapPatch& patch, const Eigen::Vector2d& middle)
+{
+  double reach = 0.0;
+  for (int row = 0; row < SupportGrid::kCells; ++row)
+    for (int column = 0; column < SupportGrid::kCells; ++column)
+      if (patch.support.isSet(column, row)) {
+        const Eigen::Vector2d cell(SupportGrid::middle(column),
+                                   SupportGrid::middle(row));
+        reach = std::max(reach, (cell - middle).norm());
+      }
+  return patch.radius_m * (reach + 0.5 * SupportGrid::cellSize());
+}
+
+/// In the plane of the anchor, in radii.
+std::optional<Eigen::Vector2d>
+middleInPlane(const SupportGrid& support)
+{
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  int cells = 0;
+  for (int row = 0; row < SupportGrid::kCells; ++row)
+    for (int column = 0; column < SupportGrid::kCells; ++column)
+      if (support.isSet(column, row)) {
+        sum += Eigen::Vector2d(SupportGrid::middle(column), SupportGrid::middle(row));
+        ++cells;
+      }
+  if (cells == 0)
+    return std::nullopt;
+  return Eigen::Vector2d(sum / cells);
+}
+
+Foothold
+tried(const PatchMap& map,
+      const MapPatch& patch,
+      const contact::Sole& sole,
+      const FootholdOptions& options)
+{
+  Foothold foothold;
+  foothold.patch = patch.id;
+  foothold.views = patch.epochs;
+  foothold.last_seen = patch.last_seen;
+  foothold.placement.load_direction = options.load_direction;
+  const auto middle = middleOfSupport(patch);
+  if (!middle)
+    return foothold;
+  foothold.placement.point = *middle;
+  const ContactSurface surface = contactSurfaceOf(map, patch);
+  foothold.risk = contact::atBestYaw(surface, sole, foothold.placement, options.yaws);
+  return foothold;
+}
+
+/// Keeps the best that are far enough from all better ones. \param sorted best first
+void
+keepApart(std::vector<Foothold> sorted,
+          const FootholdOptions& options,
+          FootholdRanking& ranking)
+{
+  const double spacing = options.spacing_m * options.spacing_m;
+  std::vector<Foothold>& kept = ranking.footholds;
+  for (Foothold& foothold : sorted) {
+    const Eigen::Vector3d& point = foothold.placement.point;
+    const bool is_near =
+        std::any_of(kept.begin(), kept.end(), [&](const Foothold& better) {
+          return (better.placement.point - point).squaredNorm() < spacing;
+        });
+    if (is_near)
+      ++ranking.too_near;
+    else if (kept.size() >= static_cast<std::size_t>(options.max_footholds))
+      ++ranking.beyond_limit;
+    else
+      kept.push_back(std::move(foothold));
+  }
+}
+
+} // namespace
+
+std::string
+validityError(const FootholdOptions& options)
+{
+  const double load = options.load_direction.norm();
+  if (!std::isfinite(load) || load == 0.0)
+    return "the direction of the load must be finite and not zero";
+  if (options.yaws < 1)
+    return "at least one yaw must be tried";
+  if (!std::isfinite(options.spacing_m) || options.spacing_m < 0.0)
+    return "the spacing of footholds must not be negative";
+  if (options.max_footholds < 1)
+    return "at least one foothold must be asked for";
+  return options.threads >= 0 ? "" : "the number of threads must not be negative";
+}
+
+std::optional<Eigen::Vector3d>
+middleOfSupport(const MapPatch& patch)
+{
+  const auto middle = middleInPlane(patch.support);
+  if (!middle)
+    return std::nullopt;
+  const Eigen::Vector2d p = patch.radius_m * *middle;
+  const double height = jetBasis(p.x(), p.y()).dot(patch.jet.value());
+  return patch.anchor.toWorld({p.x(), p.y(), height});
+}
+
+FootholdRanking
+rankFootholds(const PatchMap& map, const Foot& foot, const FootholdOptions& options)
+{
+  requireValid(validityError(foot));
+  requireValid(validityError(options));
+  const contact::Sole sole(foot);
+  const std::vector<MapPatch>& patches = map.patches();
+  FootholdRanking ranking;
+  ranking.candidates = static_cast<int>(patches.size());
+  std::vector<Foothold> all(patches.size());
+  parallelFor(ranking.candidates, options.threads, [&](int item, int) {
+    const auto i = static_cast<std::size_t>(item);
+    all[i] = tried(map, patches[i], sole, options);
+  });
+
+  std::vector<Foothold> possible;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const auto middle = middleInPlane(patches[i].support);
+    if (middle)
+      ranking.widest_support_m =
+          std::max(ranking.widest_support_m, supportReach(patches[i], *middle));
+    if (!middle)
+      ++ranking.unseen;
+    else if (all[i].risk.status == ContactStatus::NotFacingTheLoad)
+      ++ranking.not_facing;
+    else if (!all[i].risk.quality)
+      ++ranking.without_support;
+    else
+      possible.push_back(std::move(all[i]));
+  }
+  std::stable_sort( // patches of equal rank stay in the order of their ids
+      possible.begin(),
+      possible.end(),
+      [](const Foothold& a, const Foothold& b) {
+        return contact::isBetter(a.risk, b.risk);
+      });
+  keepApart(std::move(possible), options, ranking);
+  return ranking;
+}
+
+ContactRisk
+bestYaw(const ContactSurface& surface, const Foot& foot, Placement& placement, int yaws)
+{
+  if (const std::string error = validityError(placement); !error.empty())
+    throw std::invalid_argument("holdfast::bestYaw: " + error);
+  if (yaws < 1)
+    throw std::invalid_argument("holdfast::bestYaw: at least one yaw must be tried");
+  return contact::atBestYaw(surface, contact::Sole(foot), placement, yaws);
+}
+
+} // namespace holdfast
