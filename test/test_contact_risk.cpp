@@ -2,11 +2,11 @@
 #include "support/random.h"
 
 #include <holdfast/contact/contact_risk.h>
+#include <holdfast/evaluation/contact_referee.h>
 #include <holdfast/geometry/constants.h>
 #include <holdfast/geometry/gaussian.h>
 #include <holdfast/geometry/rotation.h>
 
-#include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -89,155 +89,6 @@ randomPlacement(const ContactSurface& surface, Random& random)
   return placement;
 }
 
-/// Even-odd rule.
-bool
-isInside(const std::vector<Vector2d>& corners, const Vector2d& p)
-{
-  bool inside = false;
-  for (std::size_t i = 0, j = corners.size() - 1; i < corners.size(); j = i++)
-    if ((corners[i].y() > p.y()) != (corners[j].y() > p.y()) &&
-        p.x() < corners[i].x() + (corners[j].x() - corners[i].x()) *
-                                     (p.y() - corners[i].y()) /
-                                     (corners[j].y() - corners[i].y()))
-      inside = !inside;
-  return inside;
-}
-
-/// The surface of a field z = h(x, y) with third derivatives, in the axes of a sole.
-struct DrawnSurface {
-  JetVector jet;
-  Eigen::Vector4d third;
-};
-
-/// What each of its ten numbers adds to the height at a place.
-Eigen::Matrix<double, 1, 10>
-termsAt(const Vector2d& p)
-{
-  const double x = p.x(), y = p.y();
-  Eigen::Matrix<double, 1, 10> terms;
-  terms << jetBasis(x, y).transpose(), x * x * x / 6.0, x * x * y / 2.0,
-      x * y * y / 2.0, y * y * y / 6.0;
-  return terms;
-}
-
-/// The off-plane heights of a surface at places, linear in [jet | third], by brute
-/// force: a raster of the sole, and the plane through it.
-class Referee {
-public:
-  explicit Referee(const Foot& foot)
-  {
-    // So fine that what its edge cuts off is 0.1 % of the sole.
-    constexpr int kRaster = 1000;
-    const double cell = 2.0 * soleReach(foot) / kRaster;
-    Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
-    Eigen::Matrix<double, 3, 10> X = Eigen::Matrix<double, 3, 10>::Zero();
-    for (int i = 0; i < kRaster; ++i)
-      for (int j = 0; j < kRaster; ++j) {
-        const Vector2d p =
-            cell * Vector2d(i + 0.5 - kRaster / 2, j + 0.5 - kRaster / 2);
-        if (!isInside(foot.sole, p))
-          continue;
-        const Vector3d b(1.0, p.x() / cell, p.y() / cell);
-        M += b * b.transpose();
-        X += b * termsAt(p);
-      }
-    Eigen::Matrix<double, 3, 10> plane = M.llt().solve(X);
-    plane.bottomRows<2>() /= cell;
-
-    std::vector<Vector2d> places;
-    places.emplace_back(cell * M.col(0).tail<2>() / M(0, 0)); // its middle
-    for (std::size_t i = 0; i < foot.sole.size(); ++i) {
-      const Vector2d& next = foot.sole[(i + 1) % foot.sole.size()];
-      places.push_back(foot.sole[i]);
-      places.emplace_back(0.5 * (foot.sole[i] + next));
-    }
-    rows_.resize(static_cast<Eigen::Index>(places.size()), 10);
-    for (std::size_t i = 0; i < places.size(); ++i)
-      rows_.row(static_cast<Eigen::Index>(i)) =
-          termsAt(places[i]) -
-          Eigen::RowVector3d(1.0, places[i].x(), places[i].y()) * plane;
-    own_ = foot.curvature;
-  }
-
-  /// Off the sole's plane at corners, middles of edges and of the sole, m.
-  Eigen::VectorXd residuals(const DrawnSurface& s) const
-  {
-    Eigen::Matrix<double, 10, 1> terms;
-    terms << s.jet, s.third;
-    terms[3] -= own_.x();
-    terms[5] -= own_.y();
-    return rows_ * terms;
-  }
-
-private:
-  Vector2d own_;
-  Eigen::Matrix<double, Eigen::Dynamic, 10> rows_;
-};
-
-/// How often each event happens in draws of the surface at the load, in the axes of the
-/// sole there.
-struct Counts {
-  double slip = 0.0, height = 0.0, tilt = 0.0, gap = 0.0, any = 0.0;
-};
-
-Counts
-countEvents(const Jet& jet,
-            const ThirdToJet& by_third,
-            double s3_per_m2,
-            const Foot& foot,
-            Random& random,
-            int draws)
-{
-  const Referee referee(foot);
-  const JetMatrix root = squareRoot(jet.covariance());
-  const Eigen::Matrix4d third_root = s3_per_m2 * squareRoot(unitThirdDerivatives());
-  const double log_variance =
-      std::log1p(std::pow(foot.friction.sigma / foot.friction.mean, 2));
-  const ContactTolerances& t = foot.tolerances;
-  Counts counts;
-  for (int i = 0; i < draws; ++i) {
-    DrawnSurface s;
-    s.third =
-        third_root * Eigen::Vector4d::NullaryExpr([&] { return random.normal(); });
-    s.jet = jet.value - by_third * s.third +
-            root * JetVector::NullaryExpr([&] { return random.normal(); });
-    const double mu =
-        foot.friction.mean *
-        std::exp(std::sqrt(log_variance) * random.normal() - 0.5 * log_variance);
-    const Vector2d slope = s.jet.segment<2>(1);
-    const bool slips = slope.norm() > mu, is_high = std::abs(s.jet[0]) > t.height_m;
-    const bool tilts = foot.ankle == Ankle::Stiff &&
-                       (slope - jet.value.segment<2>(1)).norm() > std::tan(t.tilt_rad);
-    const Eigen::ArrayXd off = referee.residuals(s).array().abs();
-    const bool gapes = (off > t.gap_m).any();
-    counts.slip += slips;
-    counts.height += is_high;
-    counts.tilt += tilts;
-    counts.gap += gapes;
-    counts.any += slips || is_high || tilts || gapes;
-  }
-  for (double* count :
-       {&counts.slip, &counts.height, &counts.tilt, &counts.gap, &counts.any})
-    *count /= draws;
-  return counts;
-}
-
-/// Draws of the product's own surface at the load, by parts that test_jet proves.
-Counts
-drawn(const ContactSurface& surface,
-      const Foot& foot,
-      const Placement& placement,
-      Random& random,
-      int draws)
-{
-  const Pose load = loadFrame(placement);
-  const ThirdToJet by_third = movedThirdToJet(thirdToJetOfDisc(surface.radius_m),
-                                              load.inverse() * surface.anchor);
-  const auto jet = transported(surface.jet, surface.anchor, load, by_third);
-  EXPECT_TRUE(jet.has_value());
-  return countEvents(*jet, by_third, surface.s3_per_m2, foot, random, draws);
-}
-
 /// Of gap and joint probability, which are integrals over lines.
 struct QuadratureError {
   double squares = 0.0;
@@ -270,17 +121,18 @@ expectRiskOfDraws(int cases, double s3_per_m2)
     const ContactRisk result = contactRisk(surface, foot, placement);
     ASSERT_EQ(result.status, ContactStatus::Ok);
     const ContactEvents& risk = result.quality->risk;
-    const Counts counts = drawn(surface, foot, placement, random, kDraws);
+    const ContactEvents counts =
+        *drawnContactEvents(surface, foot, placement, kDraws, random.engine());
     // FUSION F10: 0.003, of which the draws alone have a sigma of up to 0.0007.
     EXPECT_NEAR(risk.slip, counts.slip, 0.003);
     EXPECT_NEAR(risk.height, counts.height, 0.003);
     EXPECT_NEAR(risk.tilt, counts.tilt, 0.003);
     gap.add(risk.gap - counts.gap);
-    joint.add(risk.joint - counts.any);
+    joint.add(risk.joint - counts.joint);
     // F10, too; slip and tilt of a stiff ankle are nearly the same event.
-    if (counts.any > 1e-3 && counts.any < 0.3) {
-      EXPECT_GT(risk.total / counts.any, 0.95);
-      EXPECT_LT(risk.total / counts.any, foot.ankle == Ankle::Stiff ? 2.0 : 1.2);
+    if (counts.joint > 1e-3 && counts.joint < 0.3) {
+      EXPECT_GT(risk.total / counts.joint, 0.95);
+      EXPECT_LT(risk.total / counts.joint, foot.ankle == Ankle::Stiff ? 2.0 : 1.2);
     }
   }
   EXPECT_LT(gap.rms(), 0.003);
