@@ -96,13 +96,18 @@ TEST(FootholdRanking, IsThatOfTheContactItself)
     const MapPatch* patch = map.find(foothold.patch);
     ASSERT_NE(patch, nullptr);
     const ContactRisk alone =
-        contactRisk(contactSurfaceOf(map, *patch), smallFoot(), foothold.placement);
+        contactRisk(contactSurfaceOf(map, *patch, surfacePriorOf(map)),
+                    smallFoot(),
+                    foothold.placement);
     ASSERT_TRUE(alone.quality);
     EXPECT_NEAR(alone.quality->risk.total, foothold.risk.quality->risk.total, 1e-4);
     // No other yaw is better.
     Placement first = foothold.placement;
     for (const ContactRisk& other :
-         contactRisks(contactSurfaceOf(map, *patch), smallFoot(), first, options.yaws))
+         contactRisks(contactSurfaceOf(map, *patch, surfacePriorOf(map)),
+                      smallFoot(),
+                      first,
+                      options.yaws))
       if (other.quality) {
         EXPECT_GE(other.quality->risk.total, foothold.risk.quality->risk.total - 1e-4);
       }

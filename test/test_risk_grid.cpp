@@ -110,7 +110,10 @@ TEST(RiskGrid, SaysWhatASingleContactSays)
       for (const MapPatch& patch : map.patches()) {
         Placement best = placement;
         const ContactRisk risk =
-            bestYaw(contactSurfaceOf(map, patch), smallFoot(), best, options.yaws);
+            bestYaw(contactSurfaceOf(map, patch, surfacePriorOf(map)),
+                    smallFoot(),
+                    best,
+                    options.yaws);
         if (risk.quality)
           nearest = std::min(nearest, std::abs(risk.quality->risk.total - total));
       }

@@ -42,16 +42,22 @@ randomFoot(double radius_m, std::mt19937_64& generator)
 struct SeenMap {
   const PatchMap& map;
   Pose in_world;
+  SurfacePrior prior;
+
+  SeenMap(const PatchMap& seen, const Pose& where)
+  : map(seen), in_world(where), prior(surfacePriorOf(seen))
+  {}
 };
 
 Placement
-randomPlacement(const SeenMap& seen, const MapPatch& patch, std::mt19937_64& generator)
+randomPlacement(const SeenMap& seen,
+                const ContactSurface& surface,
+                std::mt19937_64& generator)
 {
-  const double u = patch.radius_m * uniformBetween(-0.3, 0.3, generator);
-  const double v = patch.radius_m * uniformBetween(-0.3, 0.3, generator);
-  const Jet jet{patch.jet.value(), JetMatrix::Zero(), JetMatrix::Zero()};
+  const double u = surface.radius_m * uniformBetween(-0.3, 0.3, generator);
+  const double v = surface.radius_m * uniformBetween(-0.3, 0.3, generator);
   Placement placement;
-  placement.point = patch.anchor.toWorld({u, v, jet.height(u, v)});
+  placement.point = surface.anchor.toWorld({u, v, surface.jet.height(u, v)});
   placement.load_direction = -seen.in_world.R.row(2).transpose();
   placement.yaw = uniformBetween(-3.0, 3.0, generator);
   return placement;
@@ -90,9 +96,9 @@ judge(const SeenMap& seen,
       const Foot& foot,
       std::mt19937_64& generator)
 {
-  const Placement placement = randomPlacement(seen, patch, generator);
-  const ContactRisk risk =
-      contactRisk(contactSurfaceOf(seen.map, patch), foot, placement);
+  const ContactSurface surface = contactSurfaceOf(seen.map, patch, seen.prior);
+  const Placement placement = randomPlacement(seen, surface, generator);
+  const ContactRisk risk = contactRisk(surface, foot, placement);
   if (!risk.quality)
     return std::nullopt;
   return Judged{placement, risk.quality->risk, patch.views};
@@ -121,8 +127,9 @@ casesOn(const Scene& scene, const SeenMap& seen, std::mt19937_64& generator)
 
 /// What another map says of a place, by its patch that is nearest.
 std::optional<ContactEvents>
-judgeAgain(const PatchMap& map, const Foot& foot, const Placement& placement)
+judgeAgain(const SeenMap& again, const Foot& foot, const Placement& placement)
 {
+  const PatchMap& map = again.map;
   const MapPatch* nearest = nullptr;
   double distance = 0.5 * map.options().radius_m;
   for (const MapPatch& patch : map.patches())
@@ -133,7 +140,7 @@ judgeAgain(const PatchMap& map, const Foot& foot, const Placement& placement)
   if (nearest == nullptr)
     return std::nullopt;
   const ContactRisk risk =
-      contactRisk(contactSurfaceOf(map, *nearest), foot, placement);
+      contactRisk(contactSurfaceOf(map, *nearest, again.prior), foot, placement);
   return risk.quality ? std::optional(risk.quality->risk) : std::nullopt;
 }
 
@@ -141,7 +148,7 @@ judgeAgain(const PatchMap& map, const Foot& foot, const Placement& placement)
 std::vector<ChosenCase>
 chooseOn(const Scene& scene,
          const SeenMap& seen,
-         const PatchMap& again,
+         const SeenMap& again,
          int choose_from,
          std::mt19937_64& generator)
 {
@@ -214,8 +221,8 @@ public:
       const RangeCloud frame = noisy(k);
       add(mapper, frame, k);
       const PatchMap& map = mapper.map();
-      append(casesOn(scene_, {map, truth_[k] * map.pose().inverse()}, generator_),
-             outcome_.fused);
+      const SeenMap seen(map, truth_[k] * map.pose().inverse());
+      append(casesOn(scene_, seen, generator_), outcome_.fused);
       addSingle(frame, noisy(k + truth_.size()), truth_[k]);
       walk_.progress(static_cast<int>(k) + 1, walk_.frames);
     }
@@ -240,12 +247,9 @@ private:
     FrameMapper one(sensor_, options_), other(sensor_, options_);
     one.addStill(frame);
     other.addStill(again);
-    append(casesOn(scene_, {one.map(), truth}, generator_), outcome_.single);
-    append(chooseOn(scene_,
-                    {one.map(), truth},
-                    other.map(),
-                    walk_.choose_from,
-                    generator_),
+    const SeenMap seen(one.map(), truth), seen_again(other.map(), truth);
+    append(casesOn(scene_, seen, generator_), outcome_.single);
+    append(chooseOn(scene_, seen, seen_again, walk_.choose_from, generator_),
            outcome_.chosen);
   }
 

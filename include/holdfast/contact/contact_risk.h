@@ -13,6 +13,7 @@
 #include <holdfast/fusion/patch_map.h>
 
 #include <array>
+#include <limits>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -44,8 +45,22 @@ struct ContactSurface {
   double s3_per_m2 = 0.0;
 };
 
-/// A patch of a map, with its roughness.
-ContactSurface contactSurfaceOf(const PatchMap& map, const MapPatch& patch);
+/// How much the surfaces of a scene bend, as an isotropic Gaussian field of second
+/// derivatives: xx xy yy have the covariance curvature_per_m^2 [1 0 1/3; 0 1/3 0; 1/3 0
+/// 1]. Without it a curvature may be anything, and what is measured badly is taken to
+/// be as bent as its noise makes it look.
+struct SurfacePrior {
+  double curvature_per_m = std::numeric_limits<double>::infinity();
+};
+
+/// As the patches of a map tell it: by how much their curvatures scatter beyond their
+/// own covariances (maximum likelihood). Infinite for a map without patches.
+SurfacePrior surfacePriorOf(const PatchMap& map);
+
+/// A patch of a map, with its roughness, and what is known of all surfaces there.
+ContactSurface contactSurfaceOf(const PatchMap& map,
+                                const MapPatch& patch,
+                                const SurfacePrior& prior);
 
 /// A single patch: seen wherever its boundary is.
 /// \return nothing where the fit is not usable.
