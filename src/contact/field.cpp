@@ -136,13 +136,15 @@ semidefiniteRoot(const Eigen::Matrix<double, n, n>& S)
 } // namespace
 
 std::optional<Field>
-fieldAt(const ContactSurface& surface, const Pose& load)
+fieldAt(const ContactSurface& surface,
+        const SurfaceHypothesis& hypothesis,
+        const Pose& load)
 {
   // What the quadric of a disc leaves of third derivatives, at the load's origin.
   const ThirdToJet by_third = movedThirdToJet(thirdToJetOfDisc(surface.radius_m),
                                               load.inverse() * surface.anchor);
   const std::optional<Jet> jet =
-      transported(surface.jet, surface.anchor, load, by_third);
+      transported(hypothesis.jet, surface.anchor, load, by_third);
   if (!jet || !jet->value.allFinite() || !isSeenSide(jet->value, surface.anchor, load))
     return std::nullopt;
   static const Eigen::Matrix4d kRoot = semidefiniteRoot(unitThirdDerivatives());
@@ -156,10 +158,16 @@ fieldAt(const ContactSurface& surface, const Pose& load)
       curvatures_first.transpose() * jet->covariance() * curvatures_first;
   field.factor.topLeftCorner<6, 6>() =
       curvatures_first * semidefiniteRoot<6>(covariance);
-  const Eigen::Matrix4d third = surface.s3_per_m2 * kRoot;
+  const Eigen::Matrix4d third = hypothesis.s3_per_m2 * kRoot;
   field.factor.bottomRightCorner<4, 4>() = third;
   field.factor.topRightCorner<6, 4>() = -by_third * third;
   return field.factor.allFinite() ? std::optional(field) : std::nullopt;
+}
+
+std::optional<Field>
+fieldAt(const ContactSurface& surface, const Pose& load)
+{
+  return fieldAt(surface, {1.0, surface.jet, surface.s3_per_m2}, load);
 }
 
 Lines::Lines(const Field& field) : field_(field)

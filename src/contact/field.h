@@ -40,6 +40,11 @@ struct Field {
 
 /// \param load its frame, in that of the surface.
 /// \return nothing where the surface is not seen along the load.
+std::optional<Field> fieldAt(const ContactSurface& surface,
+                             const SurfaceHypothesis& hypothesis,
+                             const Pose& load);
+
+/// Over all hypotheses.
 std::optional<Field> fieldAt(const ContactSurface& surface, const Pose& load);
 
 /// Probability that none of some events happens, by integrating exactly along lines

@@ -13,7 +13,6 @@
 #include <holdfast/fusion/patch_map.h>
 
 #include <array>
-#include <limits>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -34,27 +33,51 @@ inline constexpr std::array<std::string_view, 6> kRiskAssumptions{
     "have in common",
     "nothing is said of what lies beyond the sole, of the leg, or of balance"};
 
-/// A piece of surface that may be touched.
-struct ContactSurface {
+/// What a surface may be, and how likely it is that.
+struct SurfaceHypothesis {
+  double share = 1.0;
   Jet jet; ///< at the anchor
-  Pose anchor; ///< frame of the map, or of the sensor
-  /// Where it was seen, in the plane of the anchor, in radii of radius_m.
-  SupportGrid support;
-  double radius_m = 0.0; ///< of the disc whose best quadric it is
   /// Root mean square third derivative, 1/m^2; 0: a quadric and nothing else.
   double s3_per_m2 = 0.0;
 };
 
-/// How much the surfaces of a scene bend, as an isotropic Gaussian field of second
-/// derivatives: xx xy yy have the covariance curvature_per_m^2 [1 0 1/3; 0 1/3 0; 1/3 0
-/// 1]. Without it a curvature may be anything, and what is measured badly is taken to
-/// be as bent as its noise makes it look.
-struct SurfacePrior {
-  double curvature_per_m = std::numeric_limits<double>::infinity();
+/// A piece of surface that may be touched.
+struct ContactSurface {
+  Jet jet; ///< at the anchor
+  double s3_per_m2 = 0.0; ///< as SurfaceHypothesis
+  /// Where several kinds of surface are possible, these count, and jet and s3_per_m2
+  /// are what they have as mean and covariance. Empty: those are all.
+  std::vector<SurfaceHypothesis> hypotheses;
+  Pose anchor; ///< frame of the map, or of the sensor
+  /// Where it was seen, in the plane of the anchor, in radii of radius_m.
+  SupportGrid support;
+  double radius_m = 0.0; ///< of the disc whose best quadric it is
+
+  bool isQuadric() const
+  {
+    return hypotheses.empty() && s3_per_m2 == 0.0;
+  }
 };
 
-/// As the patches of a map tell it: by how much their curvatures scatter beyond their
-/// own covariances (maximum likelihood). Infinite for a map without patches.
+/// One kind of the surfaces of a scene: second and third derivatives are isotropic
+/// Gaussian fields.
+struct SurfaceKind {
+  double share = 1.0; ///< of all surfaces
+  /// xx xy yy have the covariance curvature_per_m^2 [1 0 1/3; 0 1/3 0; 1/3 0 1].
+  double curvature_per_m = 0.0;
+  double s3_per_m2 = 0.0; ///< SurfaceHypothesis
+};
+
+/// What is known of a scene before a place of it is looked at. Without it a curvature
+/// may be anything, and what is measured badly counts as as bent as its noise makes it
+/// look; with one kind alone, level ground counts as as rough as the edges beside it.
+struct SurfacePrior {
+  std::vector<SurfaceKind> kinds; ///< empty: nothing is known
+};
+
+/// As the patches of a map tell it: three kinds, smooth, bent and rough, that make
+/// their curvatures and misfits likeliest (expectation maximisation, from a fixed
+/// start). Nothing for a map of less than 30 patches.
 SurfacePrior surfacePriorOf(const PatchMap& map);
 
 /// A patch of a map, with its roughness, and what is known of all surfaces there.
