@@ -45,8 +45,14 @@ struct SeenMap {
   SurfacePrior prior;
 
   SeenMap(const PatchMap& seen, const Pose& where)
-  : map(seen), in_world(where), prior(surfacePriorOf(seen))
+  : map(seen), in_world(where), prior(surfacePriorOf(seen, down()))
   {}
+
+  /// Gravity, frame of the map.
+  Eigen::Vector3d down() const
+  {
+    return -in_world.R.row(2).transpose();
+  }
 };
 
 Placement
@@ -58,7 +64,7 @@ randomPlacement(const SeenMap& seen,
   const double v = surface.radius_m * uniformBetween(-0.3, 0.3, generator);
   Placement placement;
   placement.point = surface.anchor.toWorld({u, v, surface.jet.height(u, v)});
-  placement.load_direction = -seen.in_world.R.row(2).transpose();
+  placement.load_direction = seen.down();
   placement.yaw = uniformBetween(-3.0, 3.0, generator);
   return placement;
 }

@@ -178,7 +178,7 @@ rankFootholds(const PatchMap& map, const Foot& foot, const FootholdOptions& opti
   requireValid(validityError(foot));
   requireValid(validityError(options));
   const contact::Sole sole(foot);
-  const SurfacePrior prior = surfacePriorOf(map);
+  const SurfacePrior prior = surfacePriorOf(map, options.load_direction);
   const std::vector<MapPatch>& patches = map.patches();
   FootholdRanking ranking;
   ranking.candidates = static_cast<int>(patches.size());

@@ -304,7 +304,7 @@ riskGrid(const PatchMap& map, const Foot& foot, const RiskGridOptions& options)
   Placement level;
   level.load_direction = options.load_direction;
   const Eigen::Matrix3d axes = loadFrame(level).R;
-  const SurfacePrior prior = surfacePriorOf(map);
+  const SurfacePrior prior = surfacePriorOf(map, options.load_direction);
   std::vector<ContactSurface> surfaces;
   for (const MapPatch& patch : map.patches())
     surfaces.push_back(contactSurfaceOf(map, patch, prior));

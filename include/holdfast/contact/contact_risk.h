@@ -59,26 +59,31 @@ struct ContactSurface {
   }
 };
 
-/// One kind of the surfaces of a scene: second and third derivatives are isotropic
-/// Gaussian fields.
+/// One kind of the surfaces of a scene: slopes, second and third derivatives are
+/// isotropic Gaussian numbers.
 struct SurfaceKind {
   double share = 1.0; ///< of all surfaces
+  double slope = 0.0; ///< standard deviation of each of gx gy, against the load
   /// xx xy yy have the covariance curvature_per_m^2 [1 0 1/3; 0 1/3 0; 1/3 0 1].
   double curvature_per_m = 0.0;
   double s3_per_m2 = 0.0; ///< SurfaceHypothesis
 };
 
-/// What is known of a scene before a place of it is looked at. Without it a curvature
-/// may be anything, and what is measured badly counts as as bent as its noise makes it
-/// look; with one kind alone, level ground counts as as rough as the edges beside it.
+/// What is known of a scene before a place of it is looked at. Without it a surface may
+/// be anything, and what is measured badly counts as as steep and as bent as its noise
+/// makes it look; with one kind alone, level ground counts as as rough as the edges
+/// beside it.
 struct SurfacePrior {
-  std::vector<SurfaceKind> kinds; ///< empty: nothing is known
+  std::vector<SurfaceKind> kinds; ///< the smoothest first; empty: nothing is known
+  double noise_scale = 1.0; ///< of chi-square on what is smooth
+  Eigen::Vector3d load_direction = -Eigen::Vector3d::UnitZ(); ///< frame of the map
 };
 
-/// As the patches of a map tell it: three kinds, smooth, bent and rough, that make
-/// their curvatures and misfits likeliest (expectation maximisation, from a fixed
-/// start). Nothing for a map of less than 30 patches.
-SurfacePrior surfacePriorOf(const PatchMap& map);
+/// As the patches of a map tell it: the kinds, from smooth to rough, that make their
+/// slopes, curvatures and misfits likeliest (expectation maximisation, from a fixed
+/// start). Nothing for a map with less than 30 patches that face the load.
+/// \param load_direction frame of the map, of any length but zero.
+SurfacePrior surfacePriorOf(const PatchMap& map, const Eigen::Vector3d& load_direction);
 
 /// A patch of a map, with its roughness, and what is known of all surfaces there.
 ContactSurface contactSurfaceOf(const PatchMap& map,
