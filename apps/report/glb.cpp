@@ -111,7 +111,7 @@ turnUp(const Eigen::Vector3d& up)
 void
 appendPatch(Surface& surface, const Patch& patch)
 {
-  const Mesh mesh = tessellate(patch, patch.d.head<4>().maxCoeff() / 6.0);
+  const Mesh mesh = tessellate(patch, patch.d.head<4>().maxCoeff() / 4.0);
   const std::size_t first = surface.positions.size();
   std::vector<Eigen::Vector3d> normals(mesh.vertices.size(), Eigen::Vector3d::Zero());
   const auto vertex = [&](int i) { return mesh.vertices[static_cast<std::size_t>(i)]; };
@@ -133,41 +133,56 @@ appendPatch(Surface& surface, const Patch& patch)
 }
 
 /// A unit sphere from the faces of an octahedron, each cut into 16 triangles.
-const Surface&
-unitSphere()
-{
-  static const Surface kSphere = [] {
-    constexpr int kCuts = 4;
-    Surface sphere;
-    for (unsigned octant = 0; octant < 8; ++octant) {
-      const Eigen::Vector3f sign((octant & 1U) != 0 ? -1.0F : 1.0F,
-                                 (octant & 2U) != 0 ? -1.0F : 1.0F,
-                                 (octant & 4U) != 0 ? -1.0F : 1.0F);
-      const bool mirrored = sign.prod() < 0.0F;
-      const auto add = [&](int i, int j) {
-        const Eigen::Vector3f on_face(float(i), float(j), float(kCuts - i - j));
-        sphere.corners.push_back(static_cast<std::uint32_t>(sphere.positions.size()));
-        sphere.positions.emplace_back(sign.cwiseProduct(on_face.normalized()));
-      };
-      const auto triangle =
-          [&](std::array<int, 2> a, std::array<int, 2> b, std::array<int, 2> c) {
-            if (mirrored)
-              std::swap(b, c);
-            for (const auto& corner : {a, b, c})
-              add(corner[0], corner[1]);
-          };
-      for (int i = 0; i < kCuts; ++i)
-        for (int j = 0; i + j < kCuts; ++j) {
-          triangle({i, j}, {i + 1, j}, {i, j + 1});
-          if (i + j + 1 < kCuts)
-            triangle({i + 1, j}, {i + 1, j + 1}, {i, j + 1});
-        }
-    }
-    sphere.normals = sphere.positions;
-    return sphere;
-  }();
-  return kSphere;
-}
+class Sphere {
+public:
+  Sphere()
+  {
+    for (unsigned octant = 0; octant < 8; ++octant)
+      addFace({(octant & 1U) != 0 ? -1 : 1,
+               (octant & 2U) != 0 ? -1 : 1,
+               (octant & 4U) != 0 ? -1 : 1});
+    surface_.normals = surface_.positions;
+  }
+
+  const Surface& surface() const
+  {
+    return surface_;
+  }
+
+private:
+  static constexpr int kCuts = 4; // of every edge
+
+  void addFace(const Eigen::Vector3i& sign)
+  {
+    const auto corner = [&](int i, int j) {
+      return sign.cwiseProduct(Eigen::Vector3i(i, j, kCuts - i - j)).eval();
+    };
+    const bool mirrored = sign.prod() < 0;
+    const auto triangle = [&](const auto& a, const auto& b, const auto& c) {
+      for (const Eigen::Vector3i& at : {a, mirrored ? c : b, mirrored ? b : c})
+        addCorner(at);
+    };
+    for (int i = 0; i < kCuts; ++i)
+      for (int j = 0; i + j < kCuts; ++j) {
+        triangle(corner(i, j), corner(i + 1, j), corner(i, j + 1));
+        if (i + j + 1 < kCuts)
+          triangle(corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1));
+      }
+  }
+
+  /// Faces share the corners on their edges.
+  void addCorner(const Eigen::Vector3i& at)
+  {
+    const auto next = static_cast<std::uint32_t>(known_.size());
+    const auto [entry, is_new] = known_.insert({{at.x(), at.y(), at.z()}, next});
+    if (is_new)
+      surface_.positions.emplace_back(at.cast<float>().normalized());
+    surface_.corners.push_back(entry->second);
+  }
+
+  Surface surface_;
+  std::map<std::array<int, 3>, std::uint32_t> known_;
+};
 
 /// Nothing for a patch whose centre has no finite covariance.
 void
@@ -186,7 +201,8 @@ appendEllipsoid(Surface& surface, const FitResult& fit, double magnification)
   const Eigen::Vector3d radii =
       (kSigmas * magnification * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt())
           .cwiseMax(1e-7);
-  const Surface& sphere = unitSphere();
+  static const Sphere kSphere;
+  const Surface& sphere = kSphere.surface();
   const auto first = static_cast<std::uint32_t>(surface.positions.size());
   for (const Eigen::Vector3f& p : sphere.positions) {
     const Eigen::Vector3d unit = p.cast<double>();

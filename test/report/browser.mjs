@@ -5,6 +5,8 @@ import { pathToFileURL } from 'node:url';
 
 export const kSkip = 77;
 
+const kPatience = 120000; // ms: drawing in software beside other work
+
 export function skip(why) {
   console.log(`skipped: ${why}`);
   process.exit(kSkip);
@@ -43,8 +45,10 @@ export async function open(browser, path, { width = 1280, height = 1000, ...view
     if (request.url() !== url) complaints.push(`request: ${request.url().slice(0, 200)}`);
   });
   await page.setViewport({ width, height, ...viewport });
-  await page.goto(url);
-  await page.waitForFunction('window.holdfastReport !== undefined');
+  await page.goto(url, { timeout: kPatience });
+  await page.waitForFunction('window.holdfastReport?.isReady', { timeout: kPatience }).catch((error) => {
+    throw new Error(`${error.message}\n${complaints.join('\n')}`);
+  });
   await drawn(page);
   return { page, complaints };
 }

@@ -43,14 +43,14 @@ async function filter(page, text) {
 }
 
 // Draws, and counts what the graphics card was asked.
-const drawCalls = (page) => page.evaluate(() => {
+const drawCalls = (page) => drawn(page).then(() => page.evaluate(() => {
   const { renderer, scene, camera } = window.holdfastReport.view;
   renderer.render(scene, camera);
   return renderer.info.render.calls;
-});
+}));
 
 // How many pixels of the view are not its background.
-const inked = (page) => page.evaluate(() => {
+const inked = (page) => drawn(page).then(() => page.evaluate(() => {
   const { renderer, scene, camera, canvas } = window.holdfastReport.view;
   renderer.render(scene, camera);
   const copy = document.createElement('canvas');
@@ -61,7 +61,7 @@ const inked = (page) => page.evaluate(() => {
   let count = 0;
   for (let k = 3; k < data.length; k += 4) count += data[k] > 0;
   return count / (copy.width * copy.height);
-});
+}));
 
 test('opens without a complaint or a request, and shows what it is about', async () => {
   const { page, complaints } = await open(browser, inFolder('rocks.html'));
@@ -205,6 +205,7 @@ test('ellipsoids are as large as the covariance says', async () => {
   await page.$$eval('#controls input[name=normals]', ([box]) => box.click());
   for (const sigmas of [1, 2, 3]) {
     await page.select('#sigmas', String(sigmas));
+    await drawn(page);
     const { radii, magnification, lengths } = await page.evaluate(() => {
       const { view } = window.holdfastReport;
       const { array } = view.centreMesh.instanceMatrix;
@@ -240,13 +241,28 @@ test('ellipsoids are as large as the covariance says', async () => {
 test('the first magnification makes the median visible, and the screen says it', async () => {
   const { page } = await open(browser, inFolder('rocks.html'));
   const said = await page.$eval('#magnified', (text) => text.textContent);
+  // By their outlines on the screen, one by one: points of each ellipsoid projected.
   const { magnification, pixels } = await page.evaluate(() => {
     const { view } = window.holdfastReport;
-    const sizes = view.centres.map(({ columns }) => Math.hypot(...columns[0])).sort((a, b) => a - b);
-    const { magnification: factor, sigmas } = view.options;
-    return { magnification: factor, pixels: sizes[sizes.length >> 1] * sigmas * factor * view.pixelsPerMetre() };
+    const { array } = view.centreMesh.instanceMatrix;
+    const { sigmas, magnification: factor } = view.options;
+    const Point = view.camera.position.constructor;
+    const { width, height } = view.canvas.getBoundingClientRect();
+    const sizes = view.centres.map((ellipsoid, i) => {
+      const screen = (k, s) => {
+        const at = [0, 1, 2].map((c) => array[16 * i + 12 + c] + (s * array[16 * i + 4 * k + c]) / factor / sigmas);
+        const p = new Point(...at).project(view.camera);
+        return [(p.x * width) / 2, (p.y * height) / 2];
+      };
+      const reach = [0, 1, 2].map((k) => {
+        const [a, b] = [screen(k, 1e-2), screen(k, -1e-2)];
+        return Math.hypot(a[0] - b[0], a[1] - b[1]) / 2e-2;
+      });
+      return Math.max(...reach) * sigmas * factor;
+    }).sort((a, b) => a - b);
+    return { magnification: factor, pixels: sizes[sizes.length >> 1] };
   });
-  assert.ok(pixels >= 8 && (pixels < 30 || magnification === 1), `${pixels} px`);
+  assert.ok(pixels >= 3 && (pixels < 20 || magnification === 1), `${pixels} px`);
   assert.ok(said.includes('3 sigma') && said.includes(`${magnification}\u00d7`), said);
   await page.$eval('#magnifier', (slider) => {
     slider.value = 100;

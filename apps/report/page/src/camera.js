@@ -1,9 +1,7 @@
 // From where the view first looks.
-import { along, cross, median, quantile } from './linear.js';
+import { along, cross, dot, median, quantile } from './linear.js';
 
 const kMargin = 1.06;
-
-const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
 // Of points, every n-th: a few thousand are enough to frame them.
 function sample(positions) {

@@ -1,6 +1,6 @@
 // What the view shows, and how large ellipsoids are.
 import { byId, el } from './dom.js';
-import { longerAxis } from './ellipsoids.js';
+import { radiiOf } from './ellipsoids.js';
 import { format } from './measures.js';
 import { median } from './linear.js';
 
@@ -21,9 +21,13 @@ function magnifiedText(view) {
   if (!centres && !normals) return '';
   const known = view.centres.filter(Boolean);
   if (known.length === 0) return 'This result has no covariance to show.';
-  const size = format(1e3 * sigmas * median(known.map(longerAxis)));
-  const factor = magnification === 1 ? 'as large as they are' : `${magnification}\u00d7 as large as they are`;
-  return `Ellipsoids of ${sigmas} sigma, ${factor}: the median centre is uncertain by ${size} mm`;
+  const radii = known.map(radiiOf);
+  const sizes = [0, 1, 2].map((k) => format(Number((1e3 * sigmas * median(radii.map((r) => r[k]))).toPrecision(2))));
+  const factor = magnification === 1
+    ? 'drawn as large as they are'
+    : `drawn ${magnification}\u00d7 as large as they are`;
+  return `Ellipsoids of ${sigmas} sigma, ${factor}. `
+    + `The median of a centre truly has semi-axes of ${sizes.join(', ')} mm.`;
 }
 
 // \param colorings [{ name, label }]; onColor(name)

@@ -1,8 +1,8 @@
 // Ellipsoids of covariances, as the columns of matrices that a unit sphere is drawn with.
-import { along, cross, eigen, median } from './linear.js';
+import { along, cross, dot, eigen, median } from './linear.js';
 
 const kFlat = 0.02; // thickness of the ellipse of a normal, of its longer axis
-const kVisible = 9; // px, of the median's longer semi-axis by default
+const kVisible = 5; // px, of the median's semi-axis by default
 export const kMagnifications = [1, 2, 5, 10, 20, 50, 100];
 
 // { centre, columns } of one sigma about the centre of a patch, m, or null.
@@ -35,11 +35,22 @@ function unit(v) {
   return v.map((c) => c / size);
 }
 
-export const longerAxis = (ellipsoid) => Math.hypot(...ellipsoid.columns[0]);
+export const radiiOf = ({ columns }) => columns.map((column) => Math.hypot(...column));
 
-// The least magnification at which the median ellipsoid is visible.
+// The longer semi-axis of how it looks from the eye, m: errors along the rays of a
+// sensor, the largest of all, cannot be seen from where it stands.
+export function apparentRadius({ centre, columns }, eye) {
+  const ray = unit(along(centre, -1, eye));
+  const across = columns.map((column) => along(column, -dot(column, ray), ray));
+  const scatter = [0, 1, 2].map((i) =>
+    [0, 1, 2].map((j) => across.reduce((sum, column) => sum + column[i] * column[j], 0)));
+  return Math.sqrt(eigen(scatter)[0].value);
+}
+
+// The least magnification at which the median ellipsoid is visible from the eye.
 // \param pixelsPerMetre where the patches are.
-export function visibleMagnification(ellipsoids, sigmas, pixelsPerMetre) {
-  const size = sigmas * median(ellipsoids.filter(Boolean).map(longerAxis)) * pixelsPerMetre;
-  return kMagnifications.find((x) => x * size >= kVisible) ?? 100;
+export function visibleMagnification(ellipsoids, eye, sigmas, pixelsPerMetre) {
+  const radii = ellipsoids.filter(Boolean).map((ellipsoid) => apparentRadius(ellipsoid, eye));
+  const size = sigmas * median(radii) * pixelsPerMetre;
+  return kMagnifications.find((x) => x * size >= kVisible) ?? kMagnifications.at(-1);
 }

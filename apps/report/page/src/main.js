@@ -15,13 +15,10 @@ let result = null;
 let plots = [];
 
 function makeView() {
-  // Asked before three.js does, which would complain to the console.
-  if (document.createElement('canvas').getContext('webgl2')) {
-    try {
-      return new View(byId('canvas'), { onPick: select });
-    } catch {
-      // Said below.
-    }
+  try {
+    return new View(byId('canvas'), { onPick: select });
+  } catch {
+    // Said on the page.
   }
   byId('no-webgl').hidden = false;
   byId('canvas').hidden = true;
@@ -99,3 +96,4 @@ window.holdfastReport = { data, view, table, select, selected: null };
 byId('made').textContent = `Made by holdfast ${data.version}. Drawn with three.js.`;
 offerResults();
 show(0);
+window.holdfastReport.isReady = true;

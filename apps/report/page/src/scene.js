@@ -10,6 +10,7 @@ import { firstView } from './camera.js';
 import { parseHex } from './colors.js';
 import { cssColor } from './dom.js';
 import { centreEllipsoid, normalEllipsoid, visibleMagnification } from './ellipsoids.js';
+import { median } from './linear.js';
 import { Lines, mergedPatches, patchOfVertex, visibleIndex } from './geometry.js';
 
 const kManyPatches = 800; // from here on ellipsoids are coarser
@@ -28,20 +29,27 @@ function pointColors({ positions, colors, colored }) {
   return new BufferAttribute(rgb, 3, true);
 }
 
-// Moves what it draws away from the eye, without changing where it appears: points of
-// the same surface do not cover patches, patches do not cover their outlines.
+// Of half a patch's size: how far apart things that lie on each other are kept.
+const kStandOff = 0.6;
+
+// Moves what it draws away from the eye, or nearer, without changing where it appears:
+// points of the same surface do not cover patches, nor patches what lies on them.
 function standOff(material, factor) {
   material.onBeforeCompile = (shader) => {
-    shader.vertexShader = shader.vertexShader.replace('#include <project_vertex>',
+    shader.uniforms.standOff = { value: factor };
+    shader.vertexShader = `uniform float standOff;\n${shader.vertexShader}`.replace(
+      '#include <project_vertex>',
       `#include <project_vertex>
-       mvPosition.xyz *= ${factor.toFixed(4)};
-       gl_Position = projectionMatrix * mvPosition;`);
+       mvPosition.xyz *= standOff;
+       gl_Position = projectionMatrix * mvPosition;`,
+    );
   };
   return material;
 }
 
-function instances(geometry, count, color) {
-  const mesh = new InstancedMesh(geometry, new MeshLambertMaterial({ color }), Math.max(1, count));
+function instances(geometry, count, nearer) {
+  const material = new MeshLambertMaterial({ transparent: true, opacity: 0.85 });
+  const mesh = new InstancedMesh(geometry, standOff(material, nearer), Math.max(1, count));
   mesh.frustumCulled = false;
   mesh.count = 0;
   return mesh;
@@ -49,10 +57,14 @@ function instances(geometry, count, color) {
 
 export class View {
   // onPick(patch or null)
+  // \throw where there is no WebGL.
   constructor(canvas, { onPick }) {
     this.canvas = canvas;
     this.onPick = onPick;
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
+    // Asked before three.js does, which would complain to the console.
+    const context = canvas.getContext('webgl2', { antialias: true, alpha: true });
+    if (!context) throw new Error('no WebGL');
+    this.renderer = new WebGLRenderer({ canvas, context });
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
     this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio));
     this.camera = new PerspectiveCamera();
@@ -99,6 +111,8 @@ export class View {
     const { clientWidth, clientHeight } = this.canvas.parentElement;
     const positions = cloud.positions?.length ? cloud.positions : this.patches.positions;
     this.first = firstView(view, positions, clientWidth / clientHeight);
+    const size = median(this.result.meshes.reach.filter((reach) => reach > 0));
+    this.lift = Math.min(0.05, (kStandOff * (size || 0)) / this.first.depth);
     this.resetCamera();
   }
 
@@ -130,7 +144,7 @@ export class View {
     // three.js leaves the field of view out of the size of points.
     const size = (1.15 * cloud.spacing) / Math.tan((this.first.fov * Math.PI) / 360);
     const material = new PointsMaterial({ size, vertexColors: true });
-    this.cloud = new Points(geometry, standOff(material, 1.008));
+    this.cloud = new Points(geometry, standOff(material, 1 + this.lift));
     this.scene.add(this.cloud);
   }
 
@@ -148,7 +162,7 @@ export class View {
   }
 
   addLines() {
-    const material = standOff(new LineBasicMaterial({ vertexColors: true }), 0.998);
+    const material = standOff(new LineBasicMaterial({ vertexColors: true }), 1 - 0.1 * this.lift);
     this.lines = new LineSegments(new BufferGeometry(), material);
     this.lines.frustumCulled = false;
     this.scene.add(this.lines);
@@ -160,11 +174,12 @@ export class View {
     this.centres = patches.map((i) => centreEllipsoid(this.result, i));
     this.normals = patches.map((i) => normalEllipsoid(this.result, i, meshes.reach[i]));
     const sphere = new IcosahedronGeometry(1, count > kManyPatches ? 1 : 4);
-    this.centreMesh = instances(sphere, count, '#34363c');
-    this.normalMesh = instances(sphere, count, '#b5123e');
+    this.centreMesh = instances(sphere, count, 1 - 0.5 * this.lift);
+    this.normalMesh = instances(sphere, count, 1 - 0.5 * this.lift);
     this.scene.add(this.centreMesh, this.normalMesh);
-    this.options.magnification =
-      visibleMagnification(this.centres, this.options.sigmas, this.pixelsPerMetre());
+    this.options.magnification = visibleMagnification(
+      this.centres, this.first.eye, this.options.sigmas, this.pixelsPerMetre(),
+    );
   }
 
   set(options) {
@@ -202,8 +217,14 @@ export class View {
     this.update();
   }
 
+  // All changes until the next picture are worked off together.
   update() {
-    if (!this.coloring) return;
+    this.isStale = true;
+    this.redraw();
+  }
+
+  refresh() {
+    this.isStale = false;
     const { cloud, patches, centres, normals } = this.options;
     if (this.cloud) this.cloud.visible = cloud;
     this.mesh.visible = patches;
@@ -211,7 +232,6 @@ export class View {
     this.updateLines();
     this.updateInstances(this.centreMesh, centres ? this.centres : []);
     this.updateInstances(this.normalMesh, normals ? this.normals : []);
-    this.redraw();
   }
 
   updateLines() {
@@ -276,6 +296,7 @@ export class View {
     this.isAskedFor = true;
     requestAnimationFrame(() => {
       this.isAskedFor = false;
+      if (this.isStale && this.coloring) this.refresh();
       if (this.scene) this.renderer.render(this.scene, this.camera);
     });
   }
