@@ -400,16 +400,19 @@ reportPage(const std::vector<ReportResult>& results, std::size_t max_bytes)
   const std::size_t at = page.find(kDataMark);
   if (at == std::string_view::npos)
     throw std::logic_error("the template of the page has no place for data");
-  std::string data = pageData(results, kMostPoints);
-  const std::size_t shown = pointsShown(results, kMostPoints);
-  if (page.size() + data.size() > max_bytes && shown > 0) {
-    // What points take is the same for each, nearly.
-    const auto fixed = static_cast<double>(page.size() + pageData(results, 0).size());
-    const double per_point = (static_cast<double>(page.size() + data.size()) - fixed) /
-                             static_cast<double>(shown);
-    const double room = 0.99 * (static_cast<double>(max_bytes) - fixed);
-    const auto fitting = static_cast<std::size_t>(std::max(0.0, room / per_point));
-    data = pageData(results, std::clamp(fitting, kLeastPoints, kMostPoints));
+  std::size_t points = kMostPoints;
+  std::string data = pageData(results, points);
+  const std::size_t fixed = page.size() + pageData(results, 0).size();
+  while (page.size() + data.size() > max_bytes && points > kLeastPoints &&
+         pointsShown(results, points) > 0) {
+    const auto taken = static_cast<double>(page.size() + data.size() - fixed);
+    const double room =
+        std::max(0.0, static_cast<double>(max_bytes) - static_cast<double>(fixed));
+    // Fewer points lie farther apart, and compress a little less.
+    const double share = std::min(0.98, 0.97 * room / taken);
+    const auto shown = static_cast<double>(pointsShown(results, points));
+    points = std::max(kLeastPoints, static_cast<std::size_t>(share * shown));
+    data = pageData(results, points);
   }
   std::string text(page.substr(0, at));
   return text.append(data).append(page.substr(at + kDataMark.size()));

@@ -29,10 +29,12 @@ before(async () => {
 
 after(() => browser?.close());
 
-const rows = (page) => page.$$eval('#table tbody tr', (all) => all.map((row) => Number(row.dataset.patch)));
-
-const column = (page, name) => page.$eval(`#table th[data-column="${name}"]`, (th) => th.cellIndex)
-  .then((index) => page.$$eval('#table tbody tr', (all, at) => all.map((row) => row.cells[at].textContent), index));
+// The patches of all rows, also of those that are shown on request.
+const rows = (page) => page.evaluate(() => {
+  const more = document.getElementById('more');
+  if (!more.hidden) more.click();
+  return [...document.querySelectorAll('#table tbody tr')].map((row) => Number(row.dataset.patch));
+});
 
 async function filter(page, text) {
   await page.$eval('#filter', (input, value) => {
@@ -69,7 +71,7 @@ test('opens without a complaint or a request, and shows what it is about', async
   assert.equal((await rows(page)).length, json.patches.length);
   assert.ok((await inked(page)) > 0.4, 'the cloud fills the view');
   const text = await page.$eval('main', (main) => main.innerText);
-  for (const word of ['kinect_v1', 'containment', 'Principal sigmas'].slice(0, 2))
+  for (const word of ['kinect_v1', 'containment'])
     assert.ok(text.includes(word), word);
   for (const reason of Object.keys(json.rejected))
     assert.ok(text.includes(reason.replaceAll('_', ' ')), reason);
@@ -405,8 +407,9 @@ test('the table is walked through by keys, and has names for who does not see it
   await page.keyboard.press('ArrowDown');
   assert.equal(await page.evaluate(() => window.holdfastReport.selected), 1);
   assert.equal(await page.evaluate(() => document.activeElement.getAttribute('aria-label')), 'Patch 1');
+  const shown = await page.$$eval('#table tbody tr', (all) => all.length);
   await page.keyboard.press('End');
-  assert.equal(await page.evaluate(() => window.holdfastReport.selected), json.patches.length - 1);
+  assert.equal(await page.evaluate(() => window.holdfastReport.selected), shown - 1);
   const tree = JSON.stringify(await page.accessibility.snapshot({ interestingOnly: false }));
   for (const name of ['Skip to the table of patches', 'Patch 1', 'What the view shows', 'Colour'])
     assert.ok(tree.includes(name), name);

@@ -16,11 +16,19 @@ const kCompare = {
 
 const plain = (name) => name.toLowerCase().replace(/[\s_/]/g, '');
 
+// As it is written, else without blanks, else by how it begins.
 function findMeasure(measures, name) {
   const wanted = plain(name);
-  const isNamed = (test) => (m) => test(plain(m.label)) || test(plain(m.name));
-  return measures.find(isNamed((x) => x === wanted)) ??
-    measures.find(isNamed((x) => x.startsWith(wanted)));
+  const tests = [
+    (x) => x.toLowerCase() === name,
+    (x) => plain(x) === wanted,
+    (x) => plain(x).startsWith(wanted),
+  ];
+  for (const test of tests) {
+    const found = measures.find((m) => test(m.label) || test(m.name));
+    if (found) return found;
+  }
+  return undefined;
 }
 
 function comparison(parts, measures) {

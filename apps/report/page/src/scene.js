@@ -1,9 +1,9 @@
 // The 3D view: five things to draw at most, whatever the number of patches.
 import {
   BufferAttribute, BufferGeometry, ColorManagement, DirectionalLight, DoubleSide,
-  HemisphereLight, IcosahedronGeometry, InstancedMesh, LineBasicMaterial, LineSegments,
+  HemisphereLight, InstancedMesh, LineBasicMaterial, LineSegments,
   LinearSRGBColorSpace, Matrix4, Mesh, MeshLambertMaterial, PerspectiveCamera, Points,
-  PointsMaterial, Raycaster, Scene, Vector2, Vector3, WebGLRenderer,
+  PointsMaterial, Raycaster, Scene, SphereGeometry, Vector2, Vector3, WebGLRenderer,
 } from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { firstView } from './camera.js';
@@ -173,7 +173,7 @@ export class View {
     const patches = Array.from({ length: count }, (_, i) => i);
     this.centres = patches.map((i) => centreEllipsoid(this.result, i));
     this.normals = patches.map((i) => normalEllipsoid(this.result, i, meshes.reach[i]));
-    const sphere = new IcosahedronGeometry(1, count > kManyPatches ? 1 : 4);
+    const sphere = count > kManyPatches ? new SphereGeometry(1, 10, 6) : new SphereGeometry(1, 20, 12);
     this.centreMesh = instances(sphere, count, 1 - 0.5 * this.lift);
     this.normalMesh = instances(sphere, count, 1 - 0.5 * this.lift);
     this.scene.add(this.centreMesh, this.normalMesh);
