@@ -321,8 +321,8 @@ test('5000 patches take five draw calls', async () => {
 
 test('50000 points and 1000 patches fit into 2 MB, and the page says what it thinned', async () => {
   const path = inFolder('large.html');
-  run(program, 'simulate', 'rocks', '-o', inFolder('large.pcd'), '--size', '280x210');
-  run(program, 'fit', inFolder('large.pcd'), '-o', folder, '--seeds', '1400', '--quiet');
+  run(program, 'simulate', 'rocks', '-o', inFolder('large.pcd'), '--stride', '2', '--quiet');
+  run(program, 'fit', inFolder('large.pcd'), '-o', folder, '--spacing', '0.03', '--quiet');
   const large = JSON.parse(readFileSync(inFolder('large.patches.json'), 'utf8'));
   assert.ok(large.cloud_points.used > 50000, `${large.cloud_points.used} points`);
   const thousand = large.patches.slice(0, 1000);

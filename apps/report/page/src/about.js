@@ -7,14 +7,22 @@ function list(pairs) {
     [el('dt', {}, name), el('dd', {}, value)]));
 }
 
-// A tree as pairs of "a b c" and a value.
+// Numbers with as many digits as people read.
+function plain(value) {
+  if (typeof value === 'number')
+    return String(Number.isInteger(value) ? value : Number(value.toPrecision(7)));
+  return value !== null && typeof value === 'object'
+    ? flattened(value).map(([name, text]) => (Array.isArray(value) ? text : `${name} ${text}`)).join(', ')
+    : String(value);
+}
+
+// A tree as pairs of "a, b, c" and a value.
 function flattened(tree, before = '') {
   return Object.entries(tree).flatMap(([name, value]) => {
     const path = before ? `${before}, ${spaced(name)}` : spaced(name);
     if (value === null) return [[path, '\u2013']];
-    if (Array.isArray(value))
-      return [[path, value.length ? value.map((x) => (typeof x === 'object' ? JSON.stringify(x) : String(x))).join(' ') : '\u2013']];
-    return typeof value === 'object' ? flattened(value, path) : [[path, String(value)]];
+    if (Array.isArray(value)) return [[path, value.map(plain).join('; ') || '\u2013']];
+    return typeof value === 'object' ? flattened(value, path) : [[path, plain(value)]];
   });
 }
 

@@ -21,13 +21,17 @@ function magnifiedText(view) {
   if (!centres && !normals) return '';
   const known = view.centres.filter(Boolean);
   if (known.length === 0) return 'This result has no covariance to show.';
-  const radii = known.map(radiiOf);
-  const sizes = [0, 1, 2].map((k) => format(Number((1e3 * sigmas * median(radii.map((r) => r[k]))).toPrecision(2))));
   const factor = magnification === 1
     ? 'drawn as large as they are'
     : `drawn ${magnification}\u00d7 as large as they are`;
-  return `Ellipsoids of ${sigmas} sigma, ${factor}. `
-    + `The median of a centre truly has semi-axes of ${sizes.join(', ')} mm.`;
+  const size = (scale, values) => format(Number((scale * sigmas * median(values)).toPrecision(2)));
+  const radii = known.map(radiiOf);
+  const centre = [0, 1, 2].map((k) => size(1e3, radii.map((r) => r[k]))).join(', ');
+  const angles = view.result.columns.sigma_normal;
+  return [`Ellipsoids of ${sigmas} sigma, ${factor}.`,
+    centres ? `The median of a centre truly has semi-axes of ${centre} mm.` : '',
+    normals ? `The median of a normal is truly ${size(180 / Math.PI, angles)}\u00b0.` : '',
+  ].filter(Boolean).join(' ');
 }
 
 // \param colorings [{ name, label }]; onColor(name)

@@ -91,9 +91,18 @@ function offerResults() {
   byId('result').addEventListener('change', (event) => show(Number(event.target.value)));
 }
 
+// report.html#patch=12 opens with that patch selected.
+function selectLinked() {
+  const [, patch] = /^#patch=(\d+)$/.exec(location.hash) ?? [];
+  if (patch < result.count) select(Number(patch));
+}
+
+window.addEventListener('hashchange', selectLinked);
+
 // For consoles and tests.
 window.holdfastReport = { data, view, table, select, selected: null };
 byId('made').textContent = `Made by holdfast ${data.version}. Drawn with three.js.`;
 offerResults();
 show(0);
+selectLinked();
 window.holdfastReport.isReady = true;
