@@ -1,5 +1,7 @@
 #include "report/point_share.h"
 
+#include <holdfast/geometry/constants.h>
+
 #include <pcl/kdtree/kdtree_flann.h>
 
 #include <Eigen/Eigenvalues>
@@ -11,7 +13,7 @@
 namespace holdfast::app {
 namespace {
 
-constexpr int kNeighbors = 12; // of the full cloud, that a surface is told from
+constexpr int kNeighbors = 40; // of the full cloud: smooths their noise
 
 /// Indices in ascending order (Knuth's algorithm S: every choice is as likely).
 std::vector<std::size_t>
@@ -85,7 +87,8 @@ shareOf(const SeenCloud& cloud, std::size_t count)
     const Eigen::Vector3d& at = points.positions[i];
     share.positions.push_back(at);
     tree.nearestKSearch(static_cast<int>(i), kNeighbors, indices, squared);
-    gaps.push_back(std::sqrt(static_cast<double>(squared[squared.size() / 2])));
+    gaps.push_back(std::sqrt(static_cast<double>(squared.back()) /
+                             static_cast<double>(squared.size())));
     if (has_colors)
       share.colors.insert(share.colors.end(),
                           points.colors[i].begin(),
@@ -96,8 +99,8 @@ shareOf(const SeenCloud& cloud, std::size_t count)
   }
   const auto middle = gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 2);
   std::nth_element(gaps.begin(), middle, gaps.end());
-  // Six neighbours lie within sqrt(2) of the spacing of a full grid.
-  share.spacing = *middle / std::sqrt(2.0) *
+  // On a grid n points lie within sqrt(n / pi) of its spacing.
+  share.spacing = *middle * std::sqrt(kPi) *
                   std::sqrt(static_cast<double>(points.positions.size()) /
                             static_cast<double>(share.positions.size()));
   return share;
