@@ -124,14 +124,14 @@ tried(const MapPatch& patch,
 
 /// Keeps the best that are far enough from all better ones. \param sorted best first
 void
-keepApart(std::vector<Foothold> sorted,
+keepApart(const std::vector<const Foothold*>& sorted,
           const FootholdOptions& options,
           FootholdRanking& ranking)
 {
   const double spacing = options.spacing_m * options.spacing_m;
   std::vector<Foothold>& kept = ranking.footholds;
-  for (Foothold& foothold : sorted) {
-    const Eigen::Vector3d& point = foothold.placement.point;
+  for (const Foothold* foothold : sorted) {
+    const Eigen::Vector3d& point = foothold->placement.point;
     const bool is_near =
         std::any_of(kept.begin(), kept.end(), [&](const Foothold& better) {
           return (better.placement.point - point).squaredNorm() < spacing;
@@ -141,7 +141,7 @@ keepApart(std::vector<Foothold> sorted,
     else if (kept.size() >= static_cast<std::size_t>(options.max_footholds))
       ++ranking.beyond_limit;
     else
-      kept.push_back(std::move(foothold));
+      kept.push_back(*foothold);
   }
 }
 
@@ -182,35 +182,36 @@ rankFootholds(const PatchMap& map, const Foot& foot, const FootholdOptions& opti
   const std::vector<MapPatch>& patches = map.patches();
   FootholdRanking ranking;
   ranking.candidates = static_cast<int>(patches.size());
-  std::vector<Foothold> all(patches.size());
+  ranking.tried.resize(patches.size());
   parallelFor(ranking.candidates, options.threads, [&](int item, int) {
     const auto i = static_cast<std::size_t>(item);
     const ContactSurface surface = contactSurfaceOf(map, patches[i], prior);
-    all[i] = tried(patches[i], surface, sole, options);
+    ranking.tried[i] = tried(patches[i], surface, sole, options);
   });
 
-  std::vector<Foothold> possible;
-  for (std::size_t i = 0; i < all.size(); ++i) {
+  std::vector<const Foothold*> possible;
+  for (std::size_t i = 0; i < patches.size(); ++i) {
+    const ContactRisk& risk = ranking.tried[i].risk;
     const auto middle = middleInPlane(patches[i].support);
     if (middle)
       ranking.widest_support_m =
           std::max(ranking.widest_support_m, supportReach(patches[i], *middle));
     if (!middle)
       ++ranking.unseen;
-    else if (all[i].risk.status == ContactStatus::NotFacingTheLoad)
+    else if (risk.status == ContactStatus::NotFacingTheLoad)
       ++ranking.not_facing;
-    else if (!all[i].risk.quality)
+    else if (!risk.quality)
       ++ranking.without_support;
     else
-      possible.push_back(std::move(all[i]));
+      possible.push_back(&ranking.tried[i]);
   }
   std::stable_sort( // patches of equal rank stay in the order of their ids
       possible.begin(),
       possible.end(),
-      [](const Foothold& a, const Foothold& b) {
-        return contact::isBetter(a.risk, b.risk);
+      [](const Foothold* a, const Foothold* b) {
+        return contact::isBetter(a->risk, b->risk);
       });
-  keepApart(std::move(possible), options, ranking);
+  keepApart(possible, options, ranking);
   return ranking;
 }
 

@@ -1,4 +1,6 @@
+#include "built_in_files.h"
 #include "one_line.h"
+#include "yaml_section.h"
 #include <holdfast/io/atomic_file.h>
 #include <holdfast/io/config.h>
 #include <holdfast/io/pattern_map_file.h>
@@ -11,17 +13,10 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
-#include <map>
-#include <optional>
-#include <set>
 #include <sstream>
 #include <stdexcept>
-#include <string_view>
-#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -30,169 +25,7 @@ namespace holdfast {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// The whole word as a number, whatever the locale of the program; nothing for another
-/// word.
-template <typename Number>
-std::optional<Number>
-parseNumber(std::string_view word)
-{
-  // YAML allows a plus sign, from_chars does not.
-  if (word.size() > 1 && word[0] == '+' && word[1] != '-')
-    word.remove_prefix(1);
-  Number value{};
-  const char* end = word.data() + word.size();
-  const auto result = std::from_chars(word.data(), end, value);
-  if (result.ec != std::errc() || result.ptr != end)
-    return std::nullopt;
-  return value;
-}
-
-/// Counted from 1, also for an empty file, whose content is nowhere.
-int
-lineOf(const YAML::Mark& mark)
-{
-  return std::max(mark.line, 0) + 1;
-}
-
-/// One map of a YAML file; knows where it stands, for messages, and which of its keys
-/// were read, to find those nobody asked for.
-class Section {
-public:
-  /// \param line of the key that introduces the map; \param path its name, with those
-  /// of the maps around it.
-  Section(const YAML::Node& node, std::string file, int line = 1, std::string path = "")
-  : file_(std::move(file)), line_(line), path_(std::move(path))
-  {
-    if (!node.IsMap())
-      failAt(line, path_.empty() ? "file" : path_, "must be a list of `key: value`");
-    for (const auto& entry : node) {
-      const int entry_line = lineOf(entry.first.Mark());
-      if (!entry.first.IsScalar())
-        failAt(entry_line,
-               path_.empty() ? "file" : path_,
-               "has a key that is not a name");
-      const std::string& name = entry.first.Scalar();
-      if (!entries_.insert({name, {entry.second, entry_line, false}}).second)
-        failAt(entry_line, fullName(name), "is given twice");
-    }
-  }
-
-  bool has(const std::string& name) const
-  {
-    return entries_.count(name) > 0;
-  }
-
-  std::string text(const std::string& name)
-  {
-    const YAML::Node value = read(name).value;
-    if (!value.IsScalar() || value.Scalar().empty())
-      fail(name, "must be a word");
-    return value.Scalar();
-  }
-
-  double number(const std::string& name)
-  {
-    const auto result = parseNumber<double>(scalar(name));
-    if (!result || !std::isfinite(*result))
-      fail(name, "must be a finite number");
-    return *result;
-  }
-
-  double positive(const std::string& name)
-  {
-    const double result = number(name);
-    if (result <= 0.0)
-      fail(name, "must be > 0");
-    return result;
-  }
-
-  int pixels(const std::string& name)
-  {
-    // More than any image sensor has, less than overflows an index.
-    constexpr int kMaximum = 20000;
-    const auto result = parseNumber<int>(scalar(name));
-    if (!result || *result < 1 || *result > kMaximum)
-      fail(name, fmt::format("must be a whole number from 1 to {}", kMaximum));
-    return *result;
-  }
-
-  Section section(const std::string& name)
-  {
-    const Entry& entry = read(name);
-    return Section(entry.value, file_, entry.line, fullName(name));
-  }
-
-  /// The maps of a list, named `name[0]` and so on.
-  std::vector<Section> list(const std::string& name)
-  {
-    const Entry& entry = read(name);
-    if (!entry.value.IsSequence())
-      fail(name, "must be a list");
-    std::vector<Section> sections;
-    for (const YAML::Node& item : entry.value)
-      sections.push_back(
-          Section(item,
-                  file_,
-                  lineOf(item.Mark()),
-                  fullName(name) + fmt::format("[{}]", sections.size())));
-    return sections;
-  }
-
-  /// To be called once all keys were read.
-  void rejectUnknown() const
-  {
-    for (const auto& [name, entry] : entries_)
-      if (!entry.used)
-        fail(name, "is not a known key");
-  }
-
-  /// \throw std::runtime_error about the entry of that name.
-  [[noreturn]] void fail(const std::string& name, const std::string& problem) const
-  {
-    failAt(entries_.at(name).line, fullName(name), problem);
-  }
-
-private:
-  struct Entry {
-    YAML::Node value;
-    int line = 0;
-    bool used = false;
-  };
-
-  std::string fullName(const std::string& name) const
-  {
-    return io::oneLine(path_.empty() ? name : path_ + "." + name);
-  }
-
-  const Entry& read(const std::string& name)
-  {
-    const auto found = entries_.find(name);
-    if (found == entries_.end())
-      failAt(line_, fullName(name), "is missing");
-    found->second.used = true;
-    return found->second;
-  }
-
-  /// Empty for anything but a word.
-  std::string scalar(const std::string& name)
-  {
-    const YAML::Node value = read(name).value;
-    return value.IsScalar() ? value.Scalar() : std::string();
-  }
-
-  [[noreturn]] void failAt(int line,
-                           const std::string& what,
-                           const std::string& problem) const
-  {
-    throw std::runtime_error(fmt::format("{}:{}: {} {}", file_, line, what, problem));
-  }
-
-  std::string file_;
-  int line_;
-  std::string path_;
-  std::map<std::string, Entry> entries_;
-};
+using io::Section;
 
 Camera
 readCamera(Section section)
@@ -359,9 +192,8 @@ readNoise(Section section,
 }
 
 Sensor
-readSensor(const YAML::Node& node, const std::string& file)
+readSensor(Section root)
 {
-  Section root(node, file);
   Sensor sensor;
   sensor.name = root.text("name");
   sensor.camera = readCamera(root.section("camera"));
@@ -372,7 +204,7 @@ readSensor(const YAML::Node& node, const std::string& file)
     shared = {{"baseline_m", sensor.baseline_m},
               {"focal_px", sensor.disparity_focal_px}};
   }
-  readNoise(root.section("noise"), shared, file, sensor);
+  readNoise(root.section("noise"), shared, root.file(), sensor);
   root.rejectUnknown();
   return sensor;
 }
@@ -502,57 +334,13 @@ writeSensor(SectionWriter& out,
   out.finish();
 }
 
-/// The folders of built-in sensors, the most specific first.
-std::vector<fs::path>
-sensorFolders()
-{
-  std::vector<fs::path> folders;
-  if (const char* chosen = std::getenv("HOLDFAST_CONFIG_DIR"))
-    folders.push_back(fs::path(chosen) / "sensors");
-  folders.push_back(fs::path(HOLDFAST_CONFIG_DIR_INSTALL) / "sensors");
-  folders.push_back(fs::path(HOLDFAST_CONFIG_DIR_SOURCE) / "sensors");
-  return folders;
-}
-
-bool
-isFile(const fs::path& path)
-{
-  std::error_code ignored;
-  return fs::is_regular_file(path, ignored);
-}
-
-fs::path
-findSensor(const std::string& name_or_path)
-{
-  if (isFile(name_or_path))
-    return name_or_path;
-  // Anything with a separator is meant as a path, never as a name.
-  if (fs::path(name_or_path).filename() == name_or_path)
-    for (const fs::path& folder : sensorFolders())
-      if (isFile(folder / (name_or_path + ".yaml")))
-        return folder / (name_or_path + ".yaml");
-  std::string known;
-  for (const std::string& name : listSensors())
-    known += (known.empty() ? "" : ", ") + name;
-  throw std::runtime_error(
-      fmt::format("sensor {}: no such file, and no built-in sensor of that name ({})",
-                  name_or_path,
-                  known));
-}
-
 } // namespace
 
 Sensor
 loadSensor(const std::string& name_or_path)
 {
-  const std::string file = findSensor(name_or_path).string();
-  try {
-    return readSensor(YAML::LoadFile(file), file);
-  }
-  catch (const YAML::Exception& error) {
-    throw std::runtime_error(
-        fmt::format("{}:{}: {}", file, lineOf(error.mark), io::oneLine(error.msg)));
-  }
+  const std::string file = io::findBuiltIn("sensor", "sensors", name_or_path);
+  return readSensor(io::loadYaml(file));
 }
 
 void
@@ -579,14 +367,7 @@ saveSensor(const std::string& path,
 std::vector<std::string>
 listSensors()
 {
-  std::set<std::string> names;
-  for (const fs::path& folder : sensorFolders()) {
-    std::error_code ignored;
-    for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored))
-      if (entry.path().extension() == ".yaml")
-        names.insert(entry.path().stem().string());
-  }
-  return {names.begin(), names.end()};
+  return io::listBuiltIn("sensors");
 }
 
 } // namespace holdfast

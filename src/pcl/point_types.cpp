@@ -1,5 +1,6 @@
 // What PCL compiles for its own point types, for ours: a program that only includes
 // PCL's headers links.
+#include <holdfast/pcl/foothold_point.h>
 #include <holdfast/pcl/point_types.h>
 
 #include <pcl/filters/impl/extract_indices.hpp>
@@ -15,7 +16,8 @@
 #include <pcl/search/impl/organized.hpp>
 #include <pcl/search/impl/search.hpp>
 
-#define HOLDFAST_POINT_TYPES (holdfast::PointXYZCovariance)(holdfast::PatchPoint)
+#define HOLDFAST_POINT_TYPES \
+  (holdfast::PointXYZCovariance)(holdfast::PatchPoint)(holdfast::FootholdPoint)
 
 PCL_INSTANTIATE(PCLBase, HOLDFAST_POINT_TYPES)
 PCL_INSTANTIATE(KdTreeFLANN, HOLDFAST_POINT_TYPES)

@@ -30,15 +30,17 @@ std::optional<Eigen::Vector3d> middleOfSupport(const ContactSurface& surface);
 struct Foothold {
   std::uint64_t patch = 0; ///< id in the map
   Placement placement;
-  ContactRisk risk; ///< with its quality
+  ContactRisk risk;
   int views = 0; ///< independent ones of the patch
   int last_seen = 0; ///< number of the map's update
 };
 
 /// Every candidate is in one of the last five numbers, or a foothold.
 struct FootholdRanking {
-  /// Best first: by total risk in steps of 1e-6, which is what it is worked out to,
-  /// then by contact area.
+  /// Every patch at its best yaw, in the order of the map, also without quality.
+  std::vector<Foothold> tried;
+  /// All with their quality, best first: by total risk in steps of 1e-6, which is what
+  /// it is worked out to, then by contact area.
   std::vector<Foothold> footholds;
   int candidates = 0; ///< patches of the map
   int unseen = 0; ///< patches whose support is empty: a map without support grids
