@@ -56,6 +56,9 @@ public:
   /// worked out at the first that has support.
   ContactRisk atYaw(double turn);
 
+  /// Share of the sole over surface that was seen; the surface faces the load.
+  double supportShare(double turn) const;
+
 private:
   /// A hypothesis of the surface.
   struct Part {
@@ -65,7 +68,6 @@ private:
   };
 
   void workOutParts();
-  double supportShare(double turn) const;
   ContactEvents risksAt(const SoleAtYaw& extremes);
   double worstGap(const SoleAtYaw& extremes) const;
   double areaAt(double turn) const;
