@@ -1,5 +1,6 @@
 #include "commands.h"
 #include "console.h"
+#include "render_risk.h"
 #include "render_scene.h"
 #include "render_settings.h"
 #include "stroke_font.h"
@@ -41,6 +42,8 @@ constexpr const char* kExamples = R"(Examples:
       from straight above, the middle twice as large
   holdfast render results/*.patches.json -o sheet.png --size 1600x1200
       a sheet of several results
+  holdfast render risk.json -o risk.png --color risk
+      what 'holdfast risk' has found, and the soles of its footholds
   holdfast render --types -o types.png
       the ten types of patches
 
@@ -60,10 +63,12 @@ struct Subject {
   PicturePoints points;
   Pose sensor_pose;
   bool seen = false; ///< by a camera in that pose
+  std::vector<Rgb> colors; ///< of the patches one by one; empty: as the legend has them
+  std::vector<PictureSole> soles;
 };
 
-PatchReport
-readResult(const std::string& path)
+std::string
+readText(const std::string& path)
 {
   std::error_code ignored;
   if (fs::is_directory(path, ignored))
@@ -72,8 +77,16 @@ readResult(const std::string& path)
   std::ifstream file(path, std::ios::binary);
   if (!file)
     throw std::runtime_error(path + ": cannot be read: " + std::strerror(errno));
-  const std::string text{std::istreambuf_iterator<char>(file),
-                         std::istreambuf_iterator<char>()};
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+PatchReport
+readResult(const std::string& path)
+{
+  const std::string text = readText(path);
+  if (text.find("\"footholds\":") != std::string::npos)
+    throw std::runtime_error(path + ": is a result of 'holdfast risk': --color risk "
+                                    "draws it");
   try {
     PatchReport report = readJson(text);
     if (report.result.patches.empty())
@@ -187,15 +200,10 @@ mapSubject(const std::string& name, std::vector<ExtractedPatch> patches)
   return subject;
 }
 
+/// Points and sensor of a cloud.
 Subject
-loadSubject(const std::string& result, const RenderSettings& settings)
+cloudSubject(const std::string& path, const RenderSettings& settings)
 {
-  const PatchReport report = readResult(result);
-  std::vector<ExtractedPatch> patches = patchesOf(result, report, settings);
-  if (report.is_of_map && settings.cloud.empty())
-    return mapSubject(report.cloud, std::move(patches));
-  const std::string path =
-      settings.cloud.empty() ? findCloud(result, report.cloud) : settings.cloud;
   const Sensor sensor = loadSensorOption(settings.input.sensor_name);
   CloudFileInfo info;
   LoadOptions options = loadOptions(settings.input, sensor);
@@ -209,16 +217,59 @@ loadSubject(const std::string& result, const RenderSettings& settings)
       printNotice(path + ": " + notice);
 
   Subject subject;
-  subject.patches = std::move(patches);
-  subject.title = fmt::format("{}, {} {}",
-                              fs::path(path).filename().string(),
-                              subject.patches.size(),
-                              subject.patches.size() == 1 ? "patch" : "patches");
   subject.points = picturePoints(cloud, info.colors);
   subject.sensor_pose = cloud.sensor_pose;
   subject.seen = isSeenFrom(cloud.sensor_pose, subject.points.positions);
   if (!subject.seen && !settings.aside && !settings.quiet)
     printNotice(path + ": not seen from a sensor, so drawn as with --view iso");
+  return subject;
+}
+
+Subject
+riskSubject(const std::string& result, const RenderSettings& settings)
+{
+  const std::string text = readText(result);
+  RiskPicture risk;
+  try {
+    risk = readRisk(text);
+  }
+  catch (const std::runtime_error& error) {
+    throw std::runtime_error(result + ": " + error.what());
+  }
+  Subject subject;
+  if (!settings.cloud.empty())
+    subject = cloudSubject(settings.cloud, settings);
+  else if (risk.is_of_map)
+    subject = mapSubject(risk.source, risk.patches);
+  else
+    subject = cloudSubject(findCloud(result, risk.source), settings);
+  subject.title = fmt::format("{}, {} footholds on {} patches",
+                              fs::path(risk.source).filename().string(),
+                              risk.soles.size(),
+                              risk.patches.size());
+  subject.patches = std::move(risk.patches);
+  subject.colors = std::move(risk.colors);
+  subject.soles = std::move(risk.soles);
+  return subject;
+}
+
+Subject
+loadSubject(const std::string& result, const RenderSettings& settings)
+{
+  if (settings.risk)
+    return riskSubject(result, settings);
+  const PatchReport report = readResult(result);
+  std::vector<ExtractedPatch> patches = patchesOf(result, report, settings);
+  if (report.is_of_map && settings.cloud.empty())
+    return mapSubject(report.cloud, std::move(patches));
+  const std::string path =
+      settings.cloud.empty() ? findCloud(result, report.cloud) : settings.cloud;
+  Subject subject = cloudSubject(path, settings);
+  subject.patches = std::move(patches);
+  subject.title = fmt::format("{}, {} {}",
+                              fs::path(path).filename().string(),
+                              subject.patches.size(),
+                              subject.patches.size() == 1 ? "patch" : "patches");
   return subject;
 }
 
@@ -323,14 +374,25 @@ drawSubject(Canvas& canvas,
   canvas.clip(frame);
   drawPoints(canvas, view, frame, subject.points);
   // Glass shows what lies behind it, which has to be there first.
-  std::vector<std::pair<double, const FitResult*>> from_afar;
-  for (const ExtractedPatch& patch : subject.patches)
-    if (const auto at = view.project(patch.fit.patch.c))
-      from_afar.emplace_back(at->nearness, &patch.fit);
+  std::vector<std::pair<double, std::size_t>> from_afar;
+  for (std::size_t i = 0; i < subject.patches.size(); ++i)
+    if (const auto at = view.project(subject.patches[i].fit.patch.c))
+      from_afar.emplace_back(at->nearness, i);
   std::sort(from_afar.begin(), from_afar.end());
   const PatchSupport support(subject.points.positions);
-  for (const auto& [nearness, fit] : from_afar)
-    drawPatch(canvas, view, fit->patch, support.of(fit->patch), colors(*fit));
+  for (const auto& [nearness, i] : from_afar) {
+    const FitResult& fit = subject.patches[i].fit;
+    const bool has_own = !subject.colors.empty();
+    drawPatch(canvas,
+              view,
+              fit.patch,
+              support.of(fit.patch),
+              has_own ? subject.colors[i] : colors(fit),
+              has_own ? PatchEdge::None : PatchEdge::Line); // soles have the edges
+  }
+  // The best last, over the others.
+  for (auto sole = subject.soles.rbegin(); sole != subject.soles.rend(); ++sole)
+    drawSole(canvas, view, *sole);
 }
 
 void
@@ -347,11 +409,15 @@ renderResults(Canvas& canvas, const RenderSettings& settings)
   const PatchColors colors(settings.measure, all_patches);
   const Rgb text = textColor(settings.background);
   const Frame whole = canvas.frame();
-  const int legend_top =
-      whole.bottom - kMargin - colors.legendHeight(whole.width() - 2 * kMargin);
-  colors.drawLegend(canvas,
-                    {kMargin, legend_top, whole.right - kMargin, whole.bottom},
-                    text);
+  const int legend_height = settings.risk ?
+                                riskLegendHeight() :
+                                colors.legendHeight(whole.width() - 2 * kMargin);
+  const int legend_top = whole.bottom - kMargin - legend_height;
+  const Frame legend{kMargin, legend_top, whole.right - kMargin, whole.bottom};
+  if (settings.risk)
+    drawRiskLegend(canvas, legend, text);
+  else
+    colors.drawLegend(canvas, legend, text);
   const int count = static_cast<int>(subjects.size());
   const int columns = static_cast<int>(std::ceil(std::sqrt(count)));
   const std::vector<Frame> frames =
