@@ -17,6 +17,7 @@ void addInfoCommand(CLI::App& app, int& exit_code);
 void addMapCommand(CLI::App& app, int& exit_code);
 void addRenderCommand(CLI::App& app, int& exit_code);
 void addReportCommand(CLI::App& app, int& exit_code);
+void addRiskCommand(CLI::App& app, int& exit_code);
 void addSimulateCommand(CLI::App& app, int& exit_code);
 
 // With HOLDFAST_BUILD_EXPERIMENTS only.

@@ -20,7 +20,8 @@ constexpr const char* kExamples = R"(Examples:
 This program was built by samples/quickstart.sh, which leaves out all commands but
 these two. From the folder of the project,
   cmake -S . -B build && cmake --build build
-builds the others as well: live, record, render, report, calibrate, simulate, experiment.
+builds the others as well: live, record, map, risk, render, report, calibrate, simulate,
+experiment.
 'holdfast COMMAND --help' explains a command.
 Exit codes: 0 all done, 1 something failed, 2 wrong usage.
 )";
@@ -39,6 +40,7 @@ constexpr const char* kExamples = R"(Examples:
                                             one patch to all points, as JSON
   holdfast map frames/ --poses trajectory.txt -o map.json
                                             patches of a moving camera, fused
+  holdfast risk rocks.pcd --foot point_foot where may a foot step, and what if?
   holdfast calibrate frames/ -o mine.yaml   how large is my camera's noise?
   holdfast experiment table1                are the covariances right?
 
@@ -74,6 +76,7 @@ run(int argc, char** argv)
 #endif
 #ifndef HOLDFAST_QUICKSTART
   holdfast::app::addMapCommand(app, exit_code);
+  holdfast::app::addRiskCommand(app, exit_code);
   holdfast::app::addRenderCommand(app, exit_code);
   holdfast::app::addReportCommand(app, exit_code);
   holdfast::app::addCalibrateCommand(app, exit_code);

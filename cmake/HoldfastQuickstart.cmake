@@ -1,6 +1,6 @@
 # What a first look does without, and what samples/quickstart.sh therefore does not
 # compile: all but `holdfast fit` and `holdfast info`, the noise calibration, simulator,
-# maps and evaluation, two covariance modes, and the library holdfast_pcl.
+# maps, contacts and evaluation, two covariance modes, and the library holdfast_pcl.
 
 # Plain variables go before the options of the same names, and leave a later build in
 # the same folder as it would have been.
@@ -16,12 +16,14 @@ set(quickstart_without
   src/sensor/pattern_calibration
   src/uncertainty/stagewise src/uncertainty/second_order
   src/pcl/frame_extraction src/pcl/frame_mapping src/pcl/map_conversions
-  src/io/patch_map_file src/io/atomic_folder src/io/range_frame src/io/trajectory_file
-  apps/calibrate/ apps/map/ apps/report/ apps/simulate/ apps/plot.cpp
+  src/io/patch_map_file src/io/foot_file src/io/atomic_folder src/io/range_frame
+  src/io/trajectory_file
+  apps/calibrate/ apps/map/ apps/report/ apps/risk/ apps/simulate/ apps/plot.cpp
   apps/result_input.cpp
   # All but what images of --dense are drawn with.
   apps/render/render.cpp apps/render/render_scene apps/render/render_settings
-  apps/render/patch_support apps/render/view)
+  apps/render/patch_support apps/render/view apps/render/render_risk
+  apps/render/risk_colors)
 # What stands in for them where the rest calls them.
 set(quickstart_instead src/uncertainty/quickstart/left_out_modes.cpp)
 

@@ -1,5 +1,6 @@
 #include "commands.h"
 #include "console.h"
+#include "render_risk.h"
 #include "render_scene.h"
 #include "render_settings.h"
 #include "result_input.h"
@@ -34,6 +35,8 @@ constexpr const char* kExamples = R"(Examples:
       from straight above, the middle twice as large
   holdfast render results/*.patches.json -o sheet.png --size 1600x1200
       a sheet of several results
+  holdfast render risk.json -o risk.png --color risk
+      what 'holdfast risk' has found, and the soles of its footholds
   holdfast render --types -o types.png
       the ten types of patches
 
@@ -51,6 +54,8 @@ struct Subject {
   std::string title;
   std::vector<ExtractedPatch> patches;
   SeenCloud cloud;
+  std::vector<Rgb> colors; ///< of the patches one by one; empty: as the legend has them
+  std::vector<PictureSole> soles;
 };
 
 /// The cloud of a result. \throw std::runtime_error when it cannot be found.
@@ -105,17 +110,10 @@ mapSubject(const std::string& name, std::vector<ExtractedPatch> patches)
   return subject;
 }
 
+/// Points and sensor of a cloud.
 Subject
-loadSubject(const std::string& result, const RenderSettings& settings)
+cloudSubject(const std::string& path, const RenderSettings& settings)
 {
-  const PatchReport report = parseResult(result, readResultText(result));
-  if (report.result.patches.empty())
-    throw std::runtime_error(result + ": has no patch");
-  std::vector<ExtractedPatch> patches = patchesOf(result, report, settings);
-  if (report.is_of_map && settings.cloud.empty())
-    return mapSubject(report.cloud, std::move(patches));
-  const std::string path =
-      settings.cloud.empty() ? cloudOf(result, report.cloud) : settings.cloud;
   const Sensor sensor = loadSensorOption(settings.input.sensor_name);
   std::vector<std::string> notices;
   Subject subject;
@@ -124,13 +122,62 @@ loadSubject(const std::string& result, const RenderSettings& settings)
   for (const std::string& notice : notices)
     if (!settings.quiet)
       printNotice(path + ": " + notice);
+  if (!subject.cloud.seen && !settings.aside && !settings.quiet)
+    printNotice(path + ": not seen from a sensor, so drawn as with --view iso");
+  return subject;
+}
+
+Subject
+riskSubject(const std::string& result, const RenderSettings& settings)
+{
+  const std::string text = readResultText(result);
+  RiskPicture risk;
+  try {
+    risk = readRisk(text);
+  }
+  catch (const std::runtime_error& error) {
+    throw std::runtime_error(result + ": " + error.what());
+  }
+  Subject subject;
+  if (!settings.cloud.empty())
+    subject = cloudSubject(settings.cloud, settings);
+  else if (risk.is_of_map)
+    subject = mapSubject(risk.source, risk.patches);
+  else
+    subject = cloudSubject(cloudOf(result, risk.source), settings);
+  subject.title = fmt::format("{}, {} footholds on {} patches",
+                              fs::path(risk.source).filename().string(),
+                              risk.soles.size(),
+                              risk.patches.size());
+  subject.patches = std::move(risk.patches);
+  subject.colors = std::move(risk.colors);
+  subject.soles = std::move(risk.soles);
+  return subject;
+}
+
+Subject
+loadSubject(const std::string& result, const RenderSettings& settings)
+{
+  if (settings.risk)
+    return riskSubject(result, settings);
+  const std::string text = readResultText(result);
+  if (text.find("\"footholds\":") != std::string::npos)
+    throw std::runtime_error(result + ": is a result of 'holdfast risk': --color risk "
+                                      "draws it");
+  const PatchReport report = parseResult(result, text);
+  if (report.result.patches.empty())
+    throw std::runtime_error(result + ": has no patch");
+  std::vector<ExtractedPatch> patches = patchesOf(result, report, settings);
+  if (report.is_of_map && settings.cloud.empty())
+    return mapSubject(report.cloud, std::move(patches));
+  const std::string path =
+      settings.cloud.empty() ? cloudOf(result, report.cloud) : settings.cloud;
+  Subject subject = cloudSubject(path, settings);
   subject.patches = std::move(patches);
   subject.title = fmt::format("{}, {} {}",
                               fs::path(path).filename().string(),
                               subject.patches.size(),
                               subject.patches.size() == 1 ? "patch" : "patches");
-  if (!subject.cloud.seen && !settings.aside && !settings.quiet)
-    printNotice(path + ": not seen from a sensor, so drawn as with --view iso");
   return subject;
 }
 
@@ -213,14 +260,25 @@ drawSubject(Canvas& canvas,
   canvas.clip(frame);
   drawPoints(canvas, view, frame, subject.cloud.points);
   // Glass shows what lies behind it, which has to be there first.
-  std::vector<std::pair<double, const FitResult*>> from_afar;
-  for (const ExtractedPatch& patch : subject.patches)
-    if (const auto at = view.project(patch.fit.patch.c))
-      from_afar.emplace_back(at->nearness, &patch.fit);
+  std::vector<std::pair<double, std::size_t>> from_afar;
+  for (std::size_t i = 0; i < subject.patches.size(); ++i)
+    if (const auto at = view.project(subject.patches[i].fit.patch.c))
+      from_afar.emplace_back(at->nearness, i);
   std::sort(from_afar.begin(), from_afar.end());
   const PatchSupport support(subject.cloud.points.positions);
-  for (const auto& [nearness, fit] : from_afar)
-    drawPatch(canvas, view, fit->patch, support.of(fit->patch), colors(*fit));
+  for (const auto& [nearness, i] : from_afar) {
+    const FitResult& fit = subject.patches[i].fit;
+    const bool has_own = !subject.colors.empty();
+    drawPatch(canvas,
+              view,
+              fit.patch,
+              support.of(fit.patch),
+              has_own ? subject.colors[i] : colors(fit),
+              has_own ? PatchEdge::None : PatchEdge::Line); // soles have the edges
+  }
+  // The best last, over the others.
+  for (auto sole = subject.soles.rbegin(); sole != subject.soles.rend(); ++sole)
+    drawSole(canvas, view, *sole);
 }
 
 void
@@ -237,11 +295,15 @@ renderResults(Canvas& canvas, const RenderSettings& settings)
   const PatchColors colors(settings.measure, all_patches);
   const Rgb text = textColor(settings.background);
   const Frame whole = canvas.frame();
-  const int legend_top =
-      whole.bottom - kMargin - colors.legendHeight(whole.width() - 2 * kMargin);
-  colors.drawLegend(canvas,
-                    {kMargin, legend_top, whole.right - kMargin, whole.bottom},
-                    text);
+  const int legend_height = settings.risk ?
+                                riskLegendHeight() :
+                                colors.legendHeight(whole.width() - 2 * kMargin);
+  const int legend_top = whole.bottom - kMargin - legend_height;
+  const Frame legend{kMargin, legend_top, whole.right - kMargin, whole.bottom};
+  if (settings.risk)
+    drawRiskLegend(canvas, legend, text);
+  else
+    colors.drawLegend(canvas, legend, text);
   const int count = static_cast<int>(subjects.size());
   const int columns = static_cast<int>(std::ceil(std::sqrt(count)));
   const std::vector<Frame> frames =

@@ -195,26 +195,40 @@ PatchColors::drawTypes(Canvas& canvas, const Frame& frame, const Rgb& text) cons
 void
 PatchColors::drawBar(Canvas& canvas, const Frame& frame, const Rgb& text) const
 {
+  std::vector<ScaleTick> ticks;
+  for (const double tick : ticks_)
+    ticks.push_back({fraction(ticks_, tick), formatNumber("%g", tick)});
+  drawScale(canvas, frame, measure_->label, ticks, viridis, text);
+}
+
+void
+drawScale(Canvas& canvas,
+          const Frame& frame,
+          const std::string& title,
+          const std::vector<ScaleTick>& ticks,
+          Rgb (*color)(double),
+          const Rgb& text)
+{
   constexpr int kGap = 14, kBarHeight = 14, kTickRoom = 40; // px
-  const int label = static_cast<int>(std::ceil(textWidth(measure_->label)));
+  const int label = static_cast<int>(std::ceil(textWidth(title)));
   const int length = std::clamp(frame.width() - label - 5 * kGap, 80, 420);
   const int left = (frame.left + frame.right - label - kGap - length) / 2;
   const int start = left + label + kGap;
-  drawText(canvas, left, frame.top + 14, measure_->label, TextAlign::Left, text);
+  drawText(canvas, left, frame.top + 14, title, TextAlign::Left, text);
   for (int i = 0; i < length; ++i)
     canvas.drawRectangle(
         {start + i, frame.top + 2, start + i + 1, frame.top + 2 + kBarHeight},
-        viridis((i + 0.5) / length));
+        color((i + 0.5) / length));
   double last = -kTickRoom;
-  for (const double tick : ticks_) {
-    const double at = length * fraction(ticks_, tick);
+  for (const ScaleTick& tick : ticks) {
+    const double at = length * tick.place;
     if (at - last < kTickRoom)
       continue;
     last = at;
     drawText(canvas,
              start + at,
              frame.top + kLine + 10,
-             formatNumber("%g", tick),
+             tick.text,
              TextAlign::Centre,
              text);
   }

@@ -28,6 +28,21 @@ std::string spacedName(SurfaceType surface);
 /// to colour-blind people and in grey.
 Rgb viridis(double t);
 
+/// A number beside a scale of colours.
+struct ScaleTick {
+  double place = 0.0; ///< 0 to 1
+  std::string text;
+};
+
+/// A bar of colours with its title, two lines of a legend high.
+/// \param color of a place from 0 to 1.
+void drawScale(Canvas& canvas,
+               const Frame& frame,
+               const std::string& title,
+               const std::vector<ScaleTick>& ticks,
+               Rgb (*color)(double),
+               const Rgb& text);
+
 /// The colours of patches and their legend.
 class PatchColors {
 public:

@@ -289,7 +289,8 @@ drawPatch(Canvas& canvas,
           const View& view,
           const Patch& patch,
           const SupportedCells& support,
-          const Rgb& color)
+          const Rgb& color,
+          PatchEdge edge)
 {
   constexpr double kStandOff = 0.25; // of the half-length
   constexpr double kOpacity = 0.7;
@@ -302,7 +303,8 @@ drawPatch(Canvas& canvas,
   drawMesh(canvas, view, mesh, *points, color, kOpacity, [&](const Eigen::Vector3d& p) {
     return support.contains(pose.toLocal(p).head<2>());
   });
-  drawOutline(canvas, *points, outlineLength(patch, spacing), scaled(color, 0.6));
+  if (edge == PatchEdge::Line)
+    drawOutline(canvas, *points, outlineLength(patch, spacing), scaled(color, 0.6));
 }
 
 void

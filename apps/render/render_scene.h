@@ -7,6 +7,8 @@
 
 #include <holdfast/patch/patch.h>
 
+#include <cstdint>
+
 namespace holdfast::app {
 
 /// Draws points as discs just large enough to touch their neighbours.
@@ -15,14 +17,18 @@ void drawPoints(Canvas& canvas,
                 const Frame& frame,
                 const PicturePoints& points);
 
-/// Draws a patch as tinted glass with an outline. It stands off its surface by a
-/// fraction of its size, so that the noise of the points it is fitted to does not cover
-/// it but other things do. Where no points support it there is the outline alone.
+/// Of a patch drawn as glass.
+enum class PatchEdge : std::uint8_t { Line, None };
+
+/// Draws a patch as tinted glass, with an outline or without. It stands off its surface
+/// by a fraction of its size, so that the noise of the points it is fitted to does not
+/// cover it but other things do. Where no points support it there is the outline alone.
 void drawPatch(Canvas& canvas,
                const View& view,
                const Patch& patch,
                const SupportedCells& support,
-               const Rgb& color);
+               const Rgb& color,
+               PatchEdge edge = PatchEdge::Line);
 
 /// Draws a patch as a solid sheet with lines of constant x and y, and its axes: x red,
 /// y green, z blue.

@@ -12,6 +12,7 @@ namespace holdfast::app {
 namespace {
 
 constexpr const char* kByType = "type";
+constexpr const char* kByRisk = "risk";
 
 /// The two numbers of "A<separator>B", or nothing.
 template <typename Number>
@@ -50,13 +51,15 @@ std::string
 parseColoring(const std::string& text, RenderSettings& settings)
 {
   settings.measure = nullptr;
+  settings.risk = text == kByRisk;
   std::string known = kByType;
   for (const Measure& measure : measures()) {
     if (isSameName(text, measure.name))
       settings.measure = &measure;
     known += ", " + measure.name;
   }
-  return settings.measure != nullptr || text == kByType ? "" : "is none of " + known;
+  const bool is_known = settings.measure != nullptr || settings.risk || text == kByType;
+  return is_known ? "" : "is none of " + known + ", " + kByRisk;
 }
 
 std::string
@@ -114,10 +117,11 @@ requirePng(const std::string& path)
 void
 addSubjectOptions(CLI::App& command, RenderSettings& settings)
 {
-  command.add_option("RESULT",
-                     settings.results,
-                     "NAME.patches.json, as holdfast fit -o writes it; several give a "
-                     "sheet of pictures with one legend");
+  command.add_option(
+      "RESULT",
+      settings.results,
+      "NAME.patches.json, as holdfast fit -o writes it, or a result of map "
+      "or risk; several give a sheet of pictures with one legend");
   command.add_option("-o,--output", settings.output, "Picture to write")
       ->required()
       ->check(requirePng)
@@ -150,9 +154,10 @@ addPictureOptions(CLI::App& command, RenderSettings& settings)
             "--color",
             parseInto(parseColoring),
             "What colours show: the type of surface; sigma of the normal (degrees) or "
-            "centre (mm), from the covariance; or chi-square over its degrees of "
-            "freedom")
-      ->type_name("type|sigma-normal|sigma-centre|chi2")
+            "centre (mm), from the covariance; chi-square over its degrees of "
+            "freedom; or, of a result of 'holdfast risk', the total risk, with the "
+            "soles of its footholds")
+      ->type_name("type|sigma-normal|sigma-centre|chi2|risk")
       ->default_str(kByType);
   addParsed(command,
             "--view",
@@ -203,6 +208,10 @@ checkRenderSettings(const RenderSettings& settings)
     throw CLI::ValidationError("RESULT",
                                settings.types ? "does not go with --types" :
                                                 "a result is needed, or --types");
+  if (settings.risk && settings.max_patches)
+    throw CLI::ValidationError("--max-patches",
+                               "does not go with --color risk: 'holdfast risk --best' "
+                               "says how many soles there are");
   if (!settings.cloud.empty() && settings.results.size() > 1)
     throw CLI::ValidationError("--cloud", "goes with a single RESULT only");
 }

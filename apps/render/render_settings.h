@@ -24,6 +24,7 @@ struct RenderSettings {
   bool types = false; ///< the ten types instead of results
   std::string output;
   const Measure* measure = nullptr; ///< that colours show; null: the type
+  bool risk = false; ///< they show the risk, and the results are of `holdfast risk`
   std::optional<Aside> aside; ///< nothing: from the sensor
   int width = 960; ///< px
   int height = 720; ///< px

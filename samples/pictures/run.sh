@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes every picture of this folder anew, in seconds.
+# Makes every picture of this folder anew, in a minute.
 #
 #   samples/pictures/run.sh HOLDFAST [RECORDINGS]     the program, and for the table and
 #                                                     the carpet the folder of recordings
@@ -19,7 +19,6 @@ cd "$work"
 "$holdfast" render rocks.patches.json -o "$here/rocks_sigma.png" --size 800x610 \
   --color sigma-normal
 
-
 # The page of a report, as a browser shows it; pngquant, where it is, makes it smaller.
 if command -v chromium >/dev/null; then
   mkdir page
@@ -31,6 +30,17 @@ if command -v chromium >/dev/null; then
     "file://$work/page.html#patch=140" 2>/dev/null
   ! command -v pngquant >/dev/null || pngquant --force --ext .png "$here/report.png"
 fi
+
+# Where a flat foot may step, from one frame of a camera that looks down by 45 degrees,
+# and from a map of twelve.
+"$holdfast" simulate boulder_field --trajectory walk --frames 12 --stride 2 -o walk
+"$holdfast" risk walk/frame_0008.pcd --foot humanoid_foot --spacing 0.2 \
+  --load-direction 0 1 1 -o risk.json --quiet
+"$holdfast" render risk.json -o "$here/risk.png" --size 640x480 --color risk
+"$holdfast" map walk --poses walk/trajectory.txt --radius 0.13 -o walk.map --quiet
+"$holdfast" risk walk.map --foot humanoid_foot --best 25 --spacing 0.15 \
+  -o risk_map.json --quiet
+"$holdfast" render risk_map.json -o "$here/risk_map.png" --size 720x480 --color risk
 
 [[ -n $recordings ]] || exit 0
 # picture RECORDING NAME [options of fit]

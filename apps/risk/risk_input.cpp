@@ -1,0 +1,119 @@
+#include "risk/risk_input.h"
+
+#include <holdfast/io/cloud_io.h>
+#include <holdfast/io/patch_map_file.h>
+#include <holdfast/pcl/frame_mapping.h>
+#include <holdfast/pcl/intrinsics.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <mutex>
+#include <stdexcept>
+
+namespace holdfast::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Patches that know the surface a little beyond the sole.
+double
+radiusFor(const Foot& foot)
+{
+  // Smaller patches have too few points of a depth camera at 1 m to be sure of a slope.
+  constexpr double kBeyond = 1.1, kLeast = 0.04; // share, m
+  return std::max(kBeyond * soleReach(foot), kLeast);
+}
+
+/// A map of a cloud without rows and columns, which FrameMapper does not take.
+PatchMap
+mapOfPoints(const RangeCloud& cloud,
+            const Sensor& sensor,
+            const MappingOptions& options,
+            PatchMap map,
+            std::vector<std::string>& notices)
+{
+  ExtractionOptions extraction = options.extraction;
+  extraction.fit.surface = SurfaceRequest::Paraboloid;
+  extraction.fit.separate_pattern = true;
+  std::vector<Measurement> measurements;
+  std::mutex mutex;
+  PatchSites sites;
+  sites.observe =
+      [&](std::size_t attempt, const ExtractedPatch& patch, const PointBatch& points) {
+        auto measurement = measurementOf(patch.fit, points, cloud.sensor_pose);
+        if (!measurement)
+          return;
+        measurement->id = attempt + 1;
+        const std::lock_guard<std::mutex> lock(mutex);
+        measurements.push_back(*measurement);
+      };
+  notices = extractPatches(cloud, sensor, extraction, sites).notices;
+  map.update(measurements); // in whatever order
+  return map;
+}
+
+Ground
+groundOfCloud(const RiskSettings& settings, const Foot& foot)
+{
+  Ground ground;
+  const Sensor named = loadSensorOption(settings.input.sensor_name);
+  const Sensor sensor = settings.no_pattern ? withoutPattern(named) : named;
+  CloudFileInfo file;
+  RangeCloud cloud =
+      loadCloud(settings.source, loadOptions(settings.input, sensor), &file);
+  ground.notices = inputNotices(settings.input, file);
+  const Sensor taken_by = sensorOf(file, sensor);
+  cloud = withoutPatternMap(settings.source, cloud, taken_by, ground.notices);
+  ground.offset = cloud.offset;
+  if (!cloud.sensor_pose_given || cloud.sensor_pose.R.isIdentity())
+    ground.image_down = cloud.sensor_pose.R.col(1);
+  ground.radius_m = settings.radius_m.value_or(radiusFor(foot));
+
+  ExtractionOptions extraction;
+  extraction.sampler.radius_m = ground.radius_m;
+  extraction.threads = settings.footholds.threads;
+  const MappingOptions options = mappingOptionsFor(taken_by, extraction);
+  PatchMap::Snapshot empty;
+  empty.options = options.map;
+  empty.pose = cloud.sensor_pose; // the frame of the map is that of the cloud
+  std::vector<std::string> notices;
+  if (cloud.points->height < 2)
+    ground.map = mapOfPoints(cloud, taken_by, options, PatchMap(empty), notices);
+  else {
+    FrameMapper mapper(taken_by, options, PatchMap(empty));
+    notices = mapper.addStill(cloud).extraction.notices;
+    ground.map = mapper.map();
+  }
+  ground.notices.insert(ground.notices.end(), notices.begin(), notices.end());
+  return ground;
+}
+
+} // namespace
+
+Ground
+loadGround(const RiskSettings& settings, const Foot& foot)
+{
+  if (fs::path(settings.source).extension() == ".json")
+    throw std::runtime_error(settings.source +
+                             ": is a result, which has no map in it: 'holdfast map' "
+                             "writes one with -o FILE.map");
+  if (fs::is_directory(settings.source))
+    throw std::runtime_error(settings.source +
+                             ": is a folder: 'holdfast map' makes a map of the frames "
+                             "in it");
+  if (!isMapFile(settings.source))
+    return groundOfCloud(settings, foot);
+  Ground ground;
+  ground.map = loadPatchMap(settings.source).map;
+  ground.is_map_file = true;
+  ground.radius_m = ground.map.options().radius_m;
+  return ground;
+}
+
+Eigen::Vector3d
+defaultLoadDirection(const Ground& ground)
+{
+  return ground.image_down.value_or(-Eigen::Vector3d::UnitZ());
+}
+
+} // namespace holdfast::app

@@ -1,0 +1,33 @@
+/// \file What is stepped on: a map, or the map of a single frame.
+#pragma once
+
+#include "risk/risk_settings.h"
+
+#include <holdfast/contact/foot.h>
+#include <holdfast/fusion/patch_map.h>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace holdfast::app {
+
+struct Ground {
+  PatchMap map;
+  bool is_map_file = false; ///< else a cloud
+  /// Of the map's frame in that of the file (RangeCloud::offset).
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();
+  /// Down in the image, where the frame is that of a camera and of nothing else.
+  std::optional<Eigen::Vector3d> image_down;
+  double radius_m = 0.0; ///< of the patches
+  std::vector<std::string> notices;
+};
+
+/// \param threads for the patches of a cloud
+/// \throw std::runtime_error "FILE: cause".
+Ground loadGround(const RiskSettings& settings, const Foot& foot);
+
+/// Down, as far as the frame tells.
+Eigen::Vector3d defaultLoadDirection(const Ground& ground);
+
+} // namespace holdfast::app
