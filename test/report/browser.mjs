@@ -32,7 +32,7 @@ export async function launch(...flags) {
 
 // Opens a file. complaints: console errors and warnings, exceptions, and every request
 // but that for the file itself.
-export async function open(browser, path, { width = 1280, height = 1000, ...viewport } = {}) {
+export async function open(browser, path, { width = 1280, height = 1000, hash = '', ...viewport } = {}) {
   const page = await browser.newPage();
   const complaints = [];
   const url = pathToFileURL(path).href;
@@ -42,10 +42,10 @@ export async function open(browser, path, { width = 1280, height = 1000, ...view
   });
   page.on('pageerror', (error) => complaints.push(`exception: ${error.message}`));
   page.on('request', (request) => {
-    if (request.url() !== url) complaints.push(`request: ${request.url().slice(0, 200)}`);
+    if (request.url().split('#')[0] !== url) complaints.push(`request: ${request.url().slice(0, 200)}`);
   });
   await page.setViewport({ width, height, ...viewport });
-  await page.goto(url, { timeout: kPatience });
+  await page.goto(url + hash, { timeout: kPatience });
   await page.waitForFunction('window.holdfastReport?.isReady', { timeout: kPatience }).catch((error) => {
     throw new Error(`${error.message}\n${complaints.join('\n')}`);
   });

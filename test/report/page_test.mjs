@@ -188,6 +188,14 @@ test('a click beside all patches selects nothing', async () => {
   await page.close();
 });
 
+test('a link opens with its patch selected', async () => {
+  const { page, complaints } = await open(browser, inFolder('rocks.html'), { hash: '#patch=7' });
+  assert.equal(await page.evaluate(() => window.holdfastReport.selected), 7);
+  assert.match(await page.$eval('#details h2', (title) => title.textContent), /^Patch 7:/);
+  assert.deepEqual(complaints, []);
+  await page.close();
+});
+
 // Eigenvalues of a symmetric 3 x 3 matrix from its characteristic polynomial, smallest
 // first; another way than the page's.
 function eigenvalues(m) {

@@ -24,7 +24,10 @@ function magnifiedText(view) {
   const factor = magnification === 1
     ? 'drawn as large as they are'
     : `drawn ${magnification}\u00d7 as large as they are`;
-  const size = (scale, values) => format(Number((scale * sigmas * median(values)).toPrecision(2)));
+  const size = (scale, values) => {
+    const value = scale * sigmas * median(values);
+    return value < 1e-3 ? '0' : format(Number(value.toPrecision(2)));
+  };
   const radii = known.map(radiiOf);
   const centre = [0, 1, 2].map((k) => size(1e3, radii.map((r) => r[k]))).join(', ');
   const angles = view.result.columns.sigma_normal;
