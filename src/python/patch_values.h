@@ -1,0 +1,21 @@
+/// \file What is known of a patch, alike for one and for many.
+#pragma once
+
+#include <holdfast/pcl/patch_extraction.h>
+
+#include <string>
+#include <vector>
+
+namespace holdfast::python {
+
+/// "sphere", "plane_circle": planes are told apart by their boundary.
+std::string typeName(PatchType type);
+
+/// Names of the flags that are set.
+std::vector<std::string> flagNames(const FitFlags& flags);
+
+/// The type a fit came out with, or one of the two names of its parts, is `word`.
+/// \throw std::invalid_argument for a word that names no type.
+bool isOfType(const ExtractedPatch& patch, const std::string& word);
+
+} // namespace holdfast::python
