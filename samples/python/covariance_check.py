@@ -24,7 +24,7 @@ fits = holdfast.fit_many(noisy, [covariance] * TRIALS, surface="paraboloid")
 
 # The curvature matrix of every fit less the true one, in units of its covariance.
 k = [truth.state_names.index(name) for name in ("k_xx", "k_xy", "k_yy")]
-errors = fits.state[:, k] - truth.state[k]
+errors = fits.difference(truth)[:, k]
 covariances = fits.covariance[:, k][:, :, k]
 squared = np.einsum("ni,ni->n", errors, np.linalg.solve(covariances, errors[..., None])[..., 0])
 

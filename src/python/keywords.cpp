@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <sstream>
 
 namespace holdfast::python {
 namespace {
@@ -107,6 +108,22 @@ std::string
 show(bool value)
 {
   return value ? "True" : "False";
+}
+
+std::string
+wrapped(const std::string& words)
+{
+  constexpr std::size_t kWidth = 86;
+  std::istringstream in(words);
+  std::string text, line = "   ", word;
+  while (in >> word) {
+    if (line.size() + 1 + word.size() > kWidth) {
+      text += line + "\n";
+      line = "       ";
+    }
+    line += " " + word;
+  }
+  return text + line + "\n";
 }
 
 void

@@ -68,6 +68,9 @@ readWord(const Names& names, const std::string& name, py::handle value)
   failWord(name, word, {names.words.begin(), names.words.end()});
 }
 
+/// Lines of an entry of help, the first further to the left.
+std::string wrapped(const std::string& words);
+
 /// The options of a function.
 template <typename Options>
 class Keywords {
@@ -134,12 +137,12 @@ public:
     return text;
   }
 
-  /// A line or more for each.
+  /// Lines for each.
   std::string help() const
   {
     std::string text;
     for (const Entry& entry : entries_)
-      text += "    " + entry.name + ": " + entry.help + "\n";
+      text += wrapped(entry.name + ": " + entry.help);
     return text;
   }
 

@@ -2,6 +2,7 @@
 #include "bindings.h"
 
 #include "arrays.h"
+#include "keywords.h"
 #include "patch_objects.h"
 #include "patch_values.h"
 
@@ -10,6 +11,8 @@
 #include <holdfast/patch/tessellation.h>
 #include <holdfast/validation/names.h>
 #include <holdfast/validation/residual.h>
+
+#include <pybind11/stl.h>
 
 #include <algorithm>
 #include <stdexcept>
@@ -35,6 +38,22 @@ flagNames(const FitFlags& flags)
     if (flags.*(each.flag))
       names.emplace_back(each.name);
   return names;
+}
+
+StateVector
+stateDifference(const FitResult& fit, const FitResult& reference)
+{
+  if (!isUsable(fit.status) || !isUsable(reference.status))
+    return {};
+  const auto isOpen = [](PatchType type) {
+    return type.surface == SurfaceType::EllipticParaboloid ||
+           type.surface == SurfaceType::HyperbolicParaboloid;
+  };
+  PatchState state = fit.state;
+  if (isOpen(state.type) && isOpen(reference.state.type))
+    state.type = reference.state.type;
+  return state.type == reference.state.type ? difference(state, reference.state) :
+                                              StateVector();
 }
 
 bool
@@ -127,8 +146,10 @@ requirePatch(const PatchObject& self)
 }
 
 py::tuple
-meshOf(const PatchObject& self, std::optional<double> spacing)
+meshOf(const PatchObject& self, const py::object& spacing_m)
 {
+  std::optional<double> spacing;
+  read("spacing", spacing_m, spacing);
   constexpr double kPieces = 8.0; // along the longest bound
   const Patch& patch = requirePatch(self);
   const double longest = patch.d.head<4>().maxCoeff();
@@ -143,6 +164,18 @@ meshOf(const PatchObject& self, std::optional<double> spacing)
   for (const std::array<int, 3>& triangle : mesh.triangles)
     t = std::copy(triangle.begin(), triangle.end(), t);
   return py::make_tuple(vertices, triangles);
+}
+
+py::array
+differenceOf(const PatchObject& self, const PatchObject& other)
+{
+  const Patch& mine = requirePatch(self);
+  const Patch& theirs = requirePatch(other);
+  const StateVector between = stateDifference(fitOf(other), fitOf(self));
+  if (between.size() == 0)
+    throw py::value_error("other: it is of type " + typeName(theirs.type) +
+                          ", this one of type " + typeName(mine.type));
+  return toArray(between);
 }
 
 py::array_t<double>
@@ -446,6 +479,16 @@ bindPatch(py::module_& module)
            "trimesh, matplotlib's plot_trisurf. `spacing` between vertices, m; None: "
            "an\n"
            "eighth of the longest bound. ValueError where there is no patch.")
+      .def("difference",
+           differenceOf,
+           py::arg("other"),
+           "difference(other) -> (S,) float64\n\n"
+           "State of another patch of the same type less that of this one, in this "
+           "one's\n"
+           "axes, with nu the turn from normal to normal, rad: what `covariance` is "
+           "of.\n"
+           "States themselves are each in axes of their own and cannot be subtracted.\n"
+           "ValueError where one of both is no patch, or their types differ.")
       .def(
           "distance",
           distancesOf,

@@ -14,6 +14,11 @@ std::string typeName(PatchType type);
 /// Names of the flags that are set.
 std::vector<std::string> flagNames(const FitFlags& flags);
 
+/// State of a fit less that of a reference, in the reference's axes. Elliptic and
+/// hyperbolic paraboloids have the same coordinates, and are told apart by a sign that
+/// noise may turn. Empty where one is not usable, or the types differ otherwise.
+StateVector stateDifference(const FitResult& fit, const FitResult& reference);
+
 /// The type a fit came out with, or one of the two names of its parts, is `word`.
 /// \throw std::invalid_argument for a word that names no type.
 bool isOfType(const ExtractedPatch& patch, const std::string& word);

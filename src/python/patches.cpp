@@ -10,6 +10,8 @@
 #include <holdfast/io/patch_io.h>
 #include <holdfast/validation/names.h>
 
+#include <pybind11/stl.h>
+
 #include <limits>
 #include <sstream>
 
@@ -392,6 +394,18 @@ itemOf(const py::object& self, py::handle choice)
   return py::cast(chosenFrom(patches, choice));
 }
 
+py::array
+differencesOf(const PatchesObject& self, const PatchObject& other)
+{
+  const FitResult& to = other.patch->fit;
+  if (!isUsable(to.status))
+    throw py::value_error("other: it is no patch: " +
+                          std::string(statusName(to.status)));
+  return vectorColumn(self, kMaxState, [&](const ExtractedPatch& p) {
+    return stateDifference(to, p.fit);
+  });
+}
+
 std::string
 jsonOf(const PatchesObject& self)
 {
@@ -519,6 +533,13 @@ bindPatches(py::module_& module)
           "mask(type) -> (N,) bool\n\n"
           "Which patches are of a surface ('plane', 'sphere', ...) or a type\n"
           "('plane_circle', ...). ValueError for what is neither.")
+      .def("difference",
+           differencesOf,
+           py::arg("other"),
+           "difference(other) -> (N, 11) float64\n\n"
+           "As Patch.difference(), of one other patch to each: row i is in the axes "
+           "that\n"
+           "covariance[i] is in. NaN where there is no patch, or one of another type.")
       .def(
           "to_dict",
           [](PatchesObject& self) {

@@ -8,6 +8,8 @@
 #include <holdfast/io/config.h>
 #include <holdfast/sensor/names.h>
 
+#include <pybind11/stl.h>
+
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -147,6 +149,22 @@ requireCamera(const Sensor& sensor)
         "must be positive, the third not negative");
 }
 
+/// The pattern is a part of the noise of a single point.
+void
+requireRoomFor(const NoisePattern& pattern,
+               const NoiseModel& noise,
+               const NoiseParameters& parameters)
+{
+  constexpr double kSlack = 1.0 + 1e-9; // sums of decimals
+  double whole = noise.covariance(Eigen::Vector3d::UnitZ())(2, 2);
+  if (noise.name() == "stereo")
+    whole = std::pow(parameters.at("sigma_disparity_px"), 2);
+  if (pattern.variance() > kSlack * whole)
+    throw py::value_error("pattern: its sigma (" + show(std::sqrt(pattern.variance())) +
+                          ") is more than that of a single point (" +
+                          show(std::sqrt(whole)) + "), of which it is a part");
+}
+
 SensorObject
 make(const py::object& the_model,
      const py::object& the_name,
@@ -183,6 +201,7 @@ make(const py::object& the_model,
   requireCamera(sensor);
   sensor.noise = makeNoiseModel(model, parameters);
   sensor.pattern = patternOf(pattern);
+  requireRoomFor(sensor.pattern, *sensor.noise, parameters);
   return SensorObject(sensor);
 }
 

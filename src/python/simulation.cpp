@@ -9,6 +9,8 @@
 #include <holdfast/simulation/simulator.h>
 #include <holdfast/simulation/trajectory.h>
 
+#include <pybind11/stl.h>
+
 #include <memory>
 #include <random>
 

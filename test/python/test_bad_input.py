@@ -167,11 +167,13 @@ def test_of_sensors(tmp_path, kinect):
     with pytest.raises(ValueError, match="sigma_disparity_px"):
         holdfast.Sensor.make("stereo", sigma_point_px=0.3)
     with pytest.raises(ValueError, match="width and height"):
-        holdfast.Sensor.make("constant", width=0)
+        holdfast.Sensor.make("constant", sigma_m=0.001, width=0)
     with pytest.raises(ValueError, match="pattern"):
-        holdfast.Sensor.make("constant", pattern=[(-1.0, 2.0, "gaussian")])
+        holdfast.Sensor.make("constant", sigma_m=0.001, pattern=[(-1.0, 2.0, "gaussian")])
+    with pytest.raises(ValueError, match="pattern: its sigma .* is more than that"):
+        holdfast.Sensor.make("constant", sigma_m=0.001, pattern=[(0.1, 2.0, "gaussian")])
     with pytest.raises(TypeError, match="pattern: each wave"):
-        holdfast.Sensor.make("constant", pattern=[1.0])
+        holdfast.Sensor.make("constant", sigma_m=0.001, pattern=[1.0])
     with pytest.raises(ValueError, match="covariances|points: shape"):
         kinect.covariances(np.ones(3))
     with pytest.raises(ValueError, match=r"depth: shape \(480, 640\)"):
@@ -207,7 +209,7 @@ def test_of_the_calibration(kinect):
 def test_of_maps(tmp_path, kinect):
     with pytest.raises(TypeError, match=r"PatchMap\(\) has no option 'radius'"):
         holdfast.PatchMap(kinect, radius=1)
-    with pytest.raises(ValueError, match="radius"):
+    with pytest.raises(ValueError, match="radii"):
         holdfast.PatchMap(kinect, radius_m=-1.0)
     made = holdfast.PatchMap(kinect)
     with pytest.raises(ValueError, match="covariance: it is zero"):

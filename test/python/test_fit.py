@@ -190,11 +190,33 @@ def test_sensor_gives_the_covariances(kinect, rng):
     quiet = kinect.without_pattern()
     known = holdfast.fit(points, quiet.covariances(points))
     there = holdfast.fit(points, sensor=quiet, noise_at_surface=False)
-    same(known, there)
+    assert known.type == there.type
+    np.testing.assert_allclose(there.state, known.state, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(
+        there.covariance, known.covariance, rtol=0, atol=1e-6 * np.abs(known.covariance).max()
+    )
     # What neighbouring pixels share does not average.
     shared = holdfast.fit(points, sensor=kinect)
     assert shared.centre_sigma > 1.5 * known.centre_sigma
     assert shared.chi2_expected < shared.dof
+
+
+def test_differences_are_in_the_axes_of_the_first(rng):
+    points = surface_points(rng, 5.0, 1.0, 3.0)
+    a = holdfast.fit(points, COVARIANCE, surface="paraboloid")
+    b = holdfast.fit(points + 1e-4, COVARIANCE, surface="paraboloid")
+    np.testing.assert_allclose(a.difference(a), 0.0, atol=1e-12)
+    turn = a.difference(b)
+    np.testing.assert_allclose(turn[-3:], b.centre - a.centre, atol=1e-12)
+    np.testing.assert_allclose(
+        np.linalg.norm(turn[6:8]), np.arccos(np.clip(a.normal @ b.normal, -1, 1)), atol=1e-7
+    )
+    many = holdfast.fit_many([points], [COVARIANCE], surface="paraboloid")
+    np.testing.assert_array_equal(many.difference(b)[0], turn)
+    plane = holdfast.fit(points, COVARIANCE, surface="plane")
+    assert np.isnan(many.difference(plane)).all()
+    with pytest.raises(ValueError, match="type"):
+        a.difference(plane)
 
 
 def test_separate_pattern(kinect, rng):

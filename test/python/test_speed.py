@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 import threading
 import time
 
 import numpy as np
-import pytest
 
 import holdfast
 from conftest import SIGMA, surface_points
@@ -26,19 +22,18 @@ def fastest(call, repeats=300):
     return best * 1e-9
 
 
-def test_one_call_costs_little_over_many(rng):
-    """A batch in one thread is the C++ function alone, but for a list of arrays."""
+def test_one_call_costs_at_most_a_microsecond_more(rng):
+    """Than the C++ function on the same memory; the best of some attempts, since
+    others use the machine as well."""
     points = surface_points(rng, n=100)
     full = np.broadcast_to(COVARIANCE, (100, 3, 3)).copy()
-    count = 200
-    many, covariances = [points] * count, [full] * count
     differences = []
-    for _ in range(5):
-        one = fastest(lambda: holdfast.fit(points, full))
-        each = fastest(lambda: holdfast.fit_many(many, covariances, threads=1), 10) / count
-        differences.append(one - each)
-    print(f"one call {one * 1e6:.2f} us, in a batch {each * 1e6:.2f} us")
-    assert min(differences) < 1e-6
+    for _ in range(10):
+        alone = holdfast._core._fit_seconds(points, full, 500)
+        one = fastest(lambda: holdfast.fit(points, full), 500)
+        differences.append(one - alone)
+        print(f"one call {one * 1e6:.2f} us, without Python {alone * 1e6:.2f} us")
+    assert np.median(differences) < 1e-6
 
 
 def test_lock_is_released(rng, kinect):
