@@ -8,7 +8,6 @@
 
 #include <holdfast/fit/names.h>
 #include <holdfast/patch/boundary.h>
-#include <holdfast/patch/tessellation.h>
 #include <holdfast/validation/names.h>
 #include <holdfast/validation/residual.h>
 
@@ -38,6 +37,26 @@ flagNames(const FitFlags& flags)
     if (flags.*(each.flag))
       names.emplace_back(each.name);
   return names;
+}
+
+Mesh
+meshOf(const Patch& patch, const std::optional<double>& spacing)
+{
+  constexpr double kPieces = 8.0; // along the longest bound
+  return tessellate(patch, spacing.value_or(patch.d.head<4>().maxCoeff() / kPieces));
+}
+
+void
+append(const Mesh& mesh,
+       std::vector<double>& vertices,
+       std::vector<std::int32_t>& triangles)
+{
+  const auto first = static_cast<std::int32_t>(vertices.size() / 3);
+  for (const Eigen::Vector3d& vertex : mesh.vertices)
+    vertices.insert(vertices.end(), vertex.data(), vertex.data() + 3);
+  for (const std::array<int, 3>& triangle : mesh.triangles)
+    for (const int vertex : triangle)
+      triangles.push_back(first + vertex);
 }
 
 StateVector
@@ -146,24 +165,21 @@ requirePatch(const PatchObject& self)
 }
 
 py::tuple
-meshOf(const PatchObject& self, const py::object& spacing_m)
+meshArrays(const PatchObject& self, const py::object& spacing_m)
 {
   std::optional<double> spacing;
   read("spacing", spacing_m, spacing);
-  constexpr double kPieces = 8.0; // along the longest bound
   const Patch& patch = requirePatch(self);
-  const double longest = patch.d.head<4>().maxCoeff();
-  const Mesh mesh = tessellate(patch, spacing.value_or(longest / kPieces));
-  auto vertices = newArray<double>({static_cast<py::ssize_t>(mesh.vertices.size()), 3});
-  auto triangles =
-      newArray<std::int32_t>({static_cast<py::ssize_t>(mesh.triangles.size()), 3});
-  double* v = vertices.mutable_data();
-  for (const Eigen::Vector3d& vertex : mesh.vertices)
-    v = std::copy_n(vertex.data(), 3, v);
-  std::int32_t* t = triangles.mutable_data();
-  for (const std::array<int, 3>& triangle : mesh.triangles)
-    t = std::copy(triangle.begin(), triangle.end(), t);
-  return py::make_tuple(vertices, triangles);
+  std::vector<double> vertices;
+  std::vector<std::int32_t> triangles;
+  {
+    const py::gil_scoped_release release;
+    append(meshOf(patch, spacing), vertices, triangles);
+  }
+  const auto vertex_count = static_cast<py::ssize_t>(vertices.size() / 3);
+  const auto triangle_count = static_cast<py::ssize_t>(triangles.size() / 3);
+  return py::make_tuple(keptArray(std::move(vertices), {vertex_count, 3}),
+                        keptArray(std::move(triangles), {triangle_count, 3}));
 }
 
 py::array
@@ -472,7 +488,7 @@ bindPatch(py::module_& module)
            dictOf,
            "to_dict() -> dict\n\nAll attributes by name, arrays as lists.")
       .def("mesh",
-           meshOf,
+           meshArrays,
            py::arg("spacing") = py::none(),
            "mesh(spacing=None) -> (vertices (V, 3) float64, triangles (T, 3) int32)\n\n"
            "The patch as triangles, counter-clockwise around the normal; for Open3D,\n"

@@ -13,7 +13,9 @@
 #include <holdfast/pcl/frame_mapping.h>
 
 #include <algorithm>
+#include <mutex>
 #include <optional>
+#include <stdexcept>
 #include <utility>
 
 namespace holdfast::python {
@@ -115,11 +117,15 @@ public:
   void move(const py::object& increment, const py::object& covariance)
   {
     const Motion next{poseOf(increment, "increment"), motionCovariance(covariance)};
+    const py::gil_scoped_release release;
+    const std::lock_guard<std::mutex> lock(mutex_);
     pending_ = pending_ ? chained(*pending_, next) : next;
   }
 
   FrameReport update(const RangeCloud& frame, bool find_pose)
   {
+    const py::gil_scoped_release release;
+    const std::lock_guard<std::mutex> lock(mutex_);
     if (find_pose && pending_)
       throw std::invalid_argument(
           "find_pose: the motion is known already, since move() told it");
@@ -129,33 +135,42 @@ public:
     return find_pose ? mapper_.addUnknown(frame) : mapper_.addStill(frame);
   }
 
-  const PatchMap& map() const
+  /// What read(map) returns, while no update changes it.
+  template <typename Read>
+  auto ask(Read read) const
   {
-    return mapper_.map();
+    const py::gil_scoped_release release;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return read(mapper_.map());
   }
 
   void save(const std::string& path) const
   {
-    savePatchMap(path, {map(), sensor_.name});
+    ask([&](const PatchMap& map) {
+      savePatchMap(path, {map, sensor_.name});
+      return 0;
+    });
   }
 
-  PatchesObject patches() const
+  std::vector<ExtractedPatch> patches() const
   {
-    const FitOptions& fit = options_.extraction.fit;
-    std::vector<ExtractedPatch> patches;
-    patches.reserve(map().patches().size());
-    FitOptions open = fit;
+    FitOptions open = options_.extraction.fit;
     open.surface = SurfaceRequest::Auto;
-    for (const MapPatch& patch : map().patches()) {
-      ExtractedPatch out;
-      out.fit = toFitResult(patch, open);
-      out.radius_m = patch.radius_m;
-      patches.push_back(std::move(out));
-    }
-    return PatchesObject(std::move(patches));
+    return ask([&](const PatchMap& map) {
+      std::vector<ExtractedPatch> patches;
+      patches.reserve(map.patches().size());
+      for (const MapPatch& patch : map.patches()) {
+        ExtractedPatch out;
+        out.fit = toFitResult(patch, open);
+        out.radius_m = patch.radius_m;
+        patches.push_back(std::move(out));
+      }
+      return patches;
+    });
   }
 
 private:
+  mutable std::mutex mutex_; ///< held without Python's lock
   Sensor sensor_;
   MappingOptions options_;
   FrameMapper mapper_;
@@ -194,18 +209,25 @@ updateMap(PatchMapObject& self, const py::object& points, const py::object& find
   bool finds = false;
   read("find_pose", find_pose, finds);
   const RangeCloud frame = cloudOf(points, py::none(), py::none());
-  FrameReport report;
-  {
-    const py::gil_scoped_release release;
-    report = self.update(frame, finds);
-  }
-  return dictOf(report);
+  return dictOf(self.update(frame, finds));
 }
 
 std::string
 pathOf(const py::object& path)
 {
   return readText("path", py::module_::import("os").attr("fspath")(path));
+}
+
+void
+saveMap(const PatchMapObject& self, const py::object& path)
+{
+  try {
+    self.save(pathOf(path));
+  }
+  catch (const std::runtime_error& error) {
+    PyErr_SetString(PyExc_OSError, error.what());
+    throw py::error_already_set();
+  }
 }
 
 std::shared_ptr<PatchMapObject>
@@ -251,16 +273,12 @@ mapHelp()
           mapKeywords().help());
 }
 
-} // namespace
+using MapClass = py::class_<PatchMapObject, std::shared_ptr<PatchMapObject>>;
 
 void
-bindPatchMap(py::module_& module)
+bindMoving(MapClass& type)
 {
-  const std::string help = mapHelp();
-  py::class_<PatchMapObject, std::shared_ptr<PatchMapObject>>(module,
-                                                              "PatchMap",
-                                                              help.c_str())
-      .def(py::init([](const py::object& sensor, const py::kwargs& given) {
+  type.def(py::init([](const py::object& sensor, const py::kwargs& given) {
              const Sensor& seen_by = sensorOf(sensor);
              return std::make_shared<PatchMapObject>(seen_by,
                                                      mappingOptionsOf(seen_by, given));
@@ -288,27 +306,36 @@ bindPatchMap(py::module_& module)
            "told, or the same as before; with find_pose=True the map itself finds it.\n"
            "The counts say what became of its measurements ('fused', 'born', 'gated', "
            "...)\n"
-           "and of patches; 'pose_found' is None unless it was looked for.")
-      .def_property_readonly("patches",
-                             &PatchMapObject::patches,
-                             "Patches of the map as it is, in its frame.")
+           "and of patches; 'pose_found' is None unless it was looked for.");
+}
+
+void
+bindAsking(MapClass& type)
+{
+  type.def_property_readonly(
+          "patches",
+          [](const PatchMapObject& self) { return PatchesObject(self.patches()); },
+          "Patches of the map as it is, in its frame.")
       .def_property_readonly(
           "pose",
-          [](const PatchMapObject& self) { return toArray(self.map().pose()); },
+          [](const PatchMapObject& self) {
+            return toArray(self.ask([](const PatchMap& map) { return map.pose(); }));
+          },
           "(4, 4) of the camera in the frame of the map, after the last update().")
       .def_property_readonly(
           "frames",
-          [](const PatchMapObject& self) { return self.map().frames(); },
+          [](const PatchMapObject& self) {
+            return self.ask([](const PatchMap& map) { return map.frames(); });
+          },
           "How many frames there were.")
       .def("__len__",
-           [](const PatchMapObject& self) { return self.map().patches().size(); })
-      .def(
-          "save",
-          [](const PatchMapObject& self, const py::object& path) {
-            self.save(pathOf(path));
-          },
-          py::arg("path"),
-          "save(path) -> None\n\nWrite the map bit for bit; OSError where that fails.")
+           [](const PatchMapObject& self) {
+             return self.ask([](const PatchMap& map) { return map.patches().size(); });
+           })
+      .def("save",
+           saveMap,
+           py::arg("path"),
+           "save(path) -> None\n\nWrite the map bit for bit; OSError where that fails.")
       .def_static(
           "load",
           loadMap,
@@ -318,6 +345,17 @@ bindPatchMap(py::module_& module)
           "A map that save() or `holdfast map` has written, to go on with. Options\n"
           "of the map are those it was made with. ValueError for what is none, or\n"
           "the map of another sensor.");
+}
+
+} // namespace
+
+void
+bindPatchMap(py::module_& module)
+{
+  const std::string help = mapHelp();
+  MapClass type(module, "PatchMap", help.c_str());
+  bindMoving(type);
+  bindAsking(type);
 }
 
 } // namespace holdfast::python

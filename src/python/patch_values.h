@@ -3,6 +3,10 @@
 
 #include <holdfast/pcl/patch_extraction.h>
 
+#include <holdfast/patch/tessellation.h>
+
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +22,14 @@ std::vector<std::string> flagNames(const FitFlags& flags);
 /// hyperbolic paraboloids have the same coordinates, and are told apart by a sign that
 /// noise may turn. Empty where one is not usable, or the types differ otherwise.
 StateVector stateDifference(const FitResult& fit, const FitResult& reference);
+
+/// \param spacing m; none: an eighth of the longest bound.
+Mesh meshOf(const Patch& patch, const std::optional<double>& spacing);
+
+/// Adds a mesh behind others.
+void append(const Mesh& mesh,
+            std::vector<double>& vertices,
+            std::vector<std::int32_t>& triangles);
 
 /// The type a fit came out with, or one of the two names of its parts, is `word`.
 /// \throw std::invalid_argument for a word that names no type.

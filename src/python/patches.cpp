@@ -12,6 +12,7 @@
 
 #include <pybind11/stl.h>
 
+#include <functional>
 #include <limits>
 #include <sstream>
 
@@ -119,63 +120,137 @@ matrixColumn(const PatchesObject& self, py::ssize_t width, Value value)
 
 struct Column {
   const char* name;
-  py::array (*make)(const PatchesObject&);
+  std::function<py::array(const PatchesObject&)> make;
   const char* help;
 };
 
-const FitResult&
-fitOf(const ExtractedPatch& patch)
+using E = ExtractedPatch;
+
+template <typename Value>
+Column
+texts(const char* name, Value value, const char* help)
 {
-  return patch.fit;
+  return {name, [=](const PatchesObject& s) { return textColumn(s, value); }, help};
+}
+
+template <typename Value>
+Column
+numberOfEach(const char* name, Value value, const char* help)
+{
+  return {name, [=](const PatchesObject& s) { return numberColumn(s, value); }, help};
+}
+
+template <typename Value>
+Column
+countOfEach(const char* name, Value value, const char* help)
+{
+  return {name, [=](const PatchesObject& s) { return countColumn(s, value); }, help};
+}
+
+template <typename Value>
+Column
+flags(const char* name, Value value, const char* help)
+{
+  return {name, [=](const PatchesObject& s) { return flagColumn(s, value); }, help};
+}
+
+template <typename Value>
+Column
+vectors(const char* name, py::ssize_t width, Value value, const char* help)
+{
+  return {name,
+          [=](const PatchesObject& s) { return vectorColumn(s, width, value); },
+          help};
+}
+
+template <typename Value>
+Column
+matrices(const char* name, py::ssize_t width, Value value, const char* help)
+{
+  return {name,
+          [=](const PatchesObject& s) { return matrixColumn(s, width, value); },
+          help};
+}
+
+/// Empty where there is no patch.
+std::string
+wordOf(const E& p, std::string (*word)(PatchType))
+{
+  return isUsable(p.fit.status) ? word(p.fit.patch.type) : std::string();
 }
 
 std::string
-wordOf(const ExtractedPatch& p, std::string (*word)(PatchType))
+surfaceWord(PatchType type)
 {
-  return isUsable(p.fit.status) ? word(p.fit.patch.type) : std::string();
+  return std::string(surfaceName(type.surface));
+}
+
+std::string
+boundaryWord(PatchType type)
+{
+  return std::string(boundaryName(type.boundary));
+}
+
+std::string
+verdictWord(const E& p)
+{
+  return p.validation ? std::string(verdictName(p.validation->verdict)) : std::string();
 }
 
 const std::vector<Column>&
 textColumns()
 {
-  using P = PatchesObject;
-  using E = ExtractedPatch;
   static const std::vector<Column> columns{
-      {"type",
-       [](const P& s) {
-         return textColumn(s, [](const E& p) { return wordOf(p, typeName); });
-       },
-       "(N,) texts as Patch.type; '' where there is no patch."},
-      {"surface",
-       [](const P& s) {
-         return textColumn(s, [](const E& p) {
-           return wordOf(p, [](PatchType t) {
-             return std::string(surfaceName(t.surface));
-           });
-         });
-       },
-       "(N,) texts as Patch.surface; '' where there is no patch."},
-      {"boundary",
-       [](const P& s) {
-         return textColumn(s, [](const E& p) {
-           return wordOf(p, [](PatchType t) {
-             return std::string(boundaryName(t.boundary));
-           });
-         });
-       },
-       "(N,) texts as Patch.boundary; '' where there is no patch."},
-      {"status",
-       [](const P& s) {
-         return textColumn(s, [](const E& p) { return statusName(p.fit.status); });
-       },
-       "(N,) texts as Patch.status."},
-      {"verdict",
-       [](const P& s) {
-         return textColumn(s, [](const E& p) {
-           return p.validation ? verdictName(p.validation->verdict) : "";
-         });
-       },
-       "(N,) texts as Patch.verdict; '' where no check was made."},
+      texts(
+          "type",
+          [](const E& p) { return wordOf(p, typeName); },
+          "(N,) texts as Patch.type; '' where there is no patch."),
+      texts(
+          "surface",
+          [](const E& p) { return wordOf(p, surfaceWord); },
+          "(N,) texts as Patch.surface; '' where there is no patch."),
+      texts(
+          "boundary",
+          [](const E& p) { return wordOf(p, boundaryWord); },
+          "(N,) texts as Patch.boundary; '' where there is no patch."),
+      texts(
+          "status",
+          [](const E& p) { return statusName(p.fit.status); },
+          "(N,) texts as Patch.status."),
+      texts("verdict",
+            verdictWord,
+            "(N,) texts as Patch.verdict; '' where no check was made."),
+  };
+  return columns;
+}
+
+const std::vector<Column>&
+geometryColumns()
+{
+  static const std::vector<Column> columns{
+      vectors(
+          "centre",
+          3,
+          [](const E& p) { return p.fit.patch.c; },
+          "(N, 3) origins of the patches, m."),
+      vectors(
+          "normal",
+          3,
+          [](const E& p) { return p.fit.patch.normal(); },
+          "(N, 3) unit normals."),
+      vectors(
+          "curvatures",
+          2,
+          [](const E& p) { return p.fit.patch.principalCurvatures(); },
+          "(N, 2) along the patches' x and y axes, 1/m."),
+      numberOfEach(
+          "normal_sigma",
+          [](const E& p) { return normalSigma(p.fit); },
+          "(N,) rms angles by which the normals may be off, rad."),
+      numberOfEach(
+          "centre_sigma",
+          [](const E& p) { return centreSigma(p.fit); },
+          "(N,) rms distances by which the centres may be off, m."),
   };
   return columns;
 }
@@ -183,75 +258,36 @@ textColumns()
 const std::vector<Column>&
 coordinateColumns()
 {
-  using P = PatchesObject;
-  using E = ExtractedPatch;
   static const std::vector<Column> columns{
-      {"centre",
-       [](const P& s) {
-         return vectorColumn(s, 3, [](const E& p) { return p.fit.patch.c; });
-       },
-       "(N, 3) origins of the patches, m."},
-      {"normal",
-       [](const P& s) {
-         return vectorColumn(s, 3, [](const E& p) { return p.fit.patch.normal(); });
-       },
-       "(N, 3) unit normals."},
-      {"curvatures",
-       [](const P& s) {
-         return vectorColumn(s, 2, [](const E& p) {
-           return p.fit.patch.principalCurvatures();
-         });
-       },
-       "(N, 2) along the patches' x and y axes, 1/m."},
-      {"state",
-       [](const P& s) {
-         return vectorColumn(s, kMaxState, [](const E& p) {
-           return pack(p.fit.state);
-         });
-       },
-       "(N, 11) as Patch.state, NaN behind what a type has."},
-      {"covariance",
-       [](const P& s) {
-         return matrixColumn(s, kMaxState, [](const E& p) {
-           return p.fit.state_covariance;
-         });
-       },
-       "(N, 11, 11) as Patch.covariance, NaN behind what a type has."},
-      {"parameters",
-       [](const P& s) {
-         return vectorColumn(s, kMaxParameters, [](const E& p) {
-           return pack(p.fit.patch);
-         });
-       },
-       "(N, 11) as Patch.parameters, NaN behind what a type has."},
-      {"parameter_covariance",
-       [](const P& s) {
-         return matrixColumn(s, kMaxParameters, [](const E& p) {
-           return observableCovariance(p.fit);
-         });
-       },
-       "(N, 11, 11) as Patch.parameter_covariance, NaN behind what a type has."},
-      {"state_size",
-       [](const P& s) {
-         return countColumn(s,
-                            [](const E& p) { return p.fit.state_covariance.rows(); });
-       },
-       "(N,) how many entries of `state` there are; 0 where there is no patch."},
-      {"parameter_size",
-       [](const P& s) {
-         return countColumn(s, [](const E& p) { return p.fit.covariance.rows(); });
-       },
-       "(N,) how many entries of `parameters` there are; 0 where there is no patch."},
-      {"normal_sigma",
-       [](const P& s) {
-         return numberColumn(s, [](const E& p) { return normalSigma(p.fit); });
-       },
-       "(N,) rms angles by which the normals may be off, rad."},
-      {"centre_sigma",
-       [](const P& s) {
-         return numberColumn(s, [](const E& p) { return centreSigma(p.fit); });
-       },
-       "(N,) rms distances by which the centres may be off, m."},
+      vectors(
+          "state",
+          kMaxState,
+          [](const E& p) { return pack(p.fit.state); },
+          "(N, 11) as Patch.state, NaN behind what a type has."),
+      matrices(
+          "covariance",
+          kMaxState,
+          [](const E& p) { return p.fit.state_covariance; },
+          "(N, 11, 11) as Patch.covariance, NaN behind what a type has."),
+      vectors(
+          "parameters",
+          kMaxParameters,
+          [](const E& p) { return pack(p.fit.patch); },
+          "(N, 11) as Patch.parameters, NaN behind what a type has."),
+      matrices(
+          "parameter_covariance",
+          kMaxParameters,
+          [](const E& p) { return observableCovariance(p.fit); },
+          "(N, 11, 11) as Patch.parameter_covariance, NaN behind what a type has."),
+      countOfEach(
+          "state_size",
+          [](const E& p) { return p.fit.state_covariance.rows(); },
+          "(N,) how many entries of `state` there are; 0 where there is no patch."),
+      countOfEach(
+          "parameter_size",
+          [](const E& p) { return p.fit.covariance.rows(); },
+          "(N,) how many entries of `parameters` there are; 0 where there is no "
+          "patch."),
   };
   return columns;
 }
@@ -259,68 +295,59 @@ coordinateColumns()
 const std::vector<Column>&
 statisticColumns()
 {
-  using P = PatchesObject;
-  using E = ExtractedPatch;
   static const std::vector<Column> columns{
-      {"ok",
-       [](const P& s) {
-         return flagColumn(s, [](const E& p) { return isUsable(p.fit.status); });
-       },
-       "(N,) bool: the fit came out."},
-      {"accepted",
-       [](const P& s) {
-         return flagColumn(s, [](const E& p) { return isAccepted(p); });
-       },
-       "(N,) bool: the fit came out, and no check turned it down."},
-      {"chi2",
-       [](const P& s) {
-         return numberColumn(s, [](const E& p) { return fitOf(p).chi2; });
-       },
-       "(N,) as Patch.chi2."},
-      {"chi2_expected",
-       [](const P& s) {
-         return numberColumn(s, [](const E& p) { return fitOf(p).chi2_expected; });
-       },
-       "(N,) as Patch.chi2_expected."},
-      {"chi2_per_dof",
-       [](const P& s) {
-         return numberColumn(s, [](const E& p) { return chi2PerDof(p.fit); });
-       },
-       "(N,) as Patch.chi2_per_dof."},
-      {"dof",
-       [](const P& s) {
-         return countColumn(s, [](const E& p) { return fitOf(p).chi2_dof; });
-       },
-       "(N,) points less surface parameters."},
-      {"points",
-       [](const P& s) {
-         return countColumn(s, [](const E& p) { return fitOf(p).points; });
-       },
-       "(N,) points used."},
-      {"seed_index",
-       [](const P& s) {
-         return countColumn(s, [](const E& p) { return p.seed_index.value_or(-1); });
-       },
-       "(N,) rows of the seeds among the points; -1: there was none."},
-      {"radius",
-       [](const P& s) {
-         return numberColumn(s, [](const E& p) { return p.radius_m; });
-       },
-       "(N,) of the neighbourhoods, m."},
-      {"residual",
-       [](const P& s) {
-         return numberColumn(s, [](const E& p) {
-           return p.validation ? p.validation->residual.rms_m : kNaN;
-         });
-       },
-       "(N,) rms distances of the points from the surfaces, m."},
-      {"coverage",
-       [](const P& s) {
-         return numberColumn(s, [](const E& p) {
-           return p.validation ? p.validation->coverage.share : kNaN;
-         });
-       },
-       "(N,) shares of the patches that their points cover."},
+      numberOfEach(
+          "chi2",
+          [](const E& p) { return p.fit.chi2; },
+          "(N,) as Patch.chi2."),
+      numberOfEach(
+          "chi2_expected",
+          [](const E& p) { return p.fit.chi2_expected; },
+          "(N,) as Patch.chi2_expected."),
+      numberOfEach(
+          "chi2_per_dof",
+          [](const E& p) { return chi2PerDof(p.fit); },
+          "(N,) as Patch.chi2_per_dof."),
+      countOfEach(
+          "dof",
+          [](const E& p) { return p.fit.chi2_dof; },
+          "(N,) points less surface parameters."),
+      countOfEach(
+          "points",
+          [](const E& p) { return p.fit.points; },
+          "(N,) points used."),
+  };
+  return columns;
+}
+
+const std::vector<Column>&
+originColumns()
+{
+  static const std::vector<Column> columns{
+      flags(
+          "ok",
+          [](const E& p) { return isUsable(p.fit.status); },
+          "(N,) bool: the fit came out."),
+      flags(
+          "accepted",
+          [](const E& p) { return isAccepted(p); },
+          "(N,) bool: the fit came out, and no check turned it down."),
+      countOfEach(
+          "seed_index",
+          [](const E& p) { return p.seed_index.value_or(-1); },
+          "(N,) rows of the seeds among the points; -1: there was none."),
+      numberOfEach(
+          "radius",
+          [](const E& p) { return p.radius_m; },
+          "(N,) of the neighbourhoods, m."),
+      numberOfEach(
+          "residual",
+          [](const E& p) { return p.validation ? p.validation->residual.rms_m : kNaN; },
+          "(N,) rms distances of the points from the surfaces, m."),
+      numberOfEach(
+          "coverage",
+          [](const E& p) { return p.validation ? p.validation->coverage.share : kNaN; },
+          "(N,) shares of the patches that their points cover."),
   };
   return columns;
 }
@@ -329,7 +356,11 @@ template <typename Visit>
 void
 visitColumns(Visit visit)
 {
-  for (const auto* table : {&textColumns(), &coordinateColumns(), &statisticColumns()})
+  for (const auto* table : {&textColumns(),
+                            &geometryColumns(),
+                            &coordinateColumns(),
+                            &statisticColumns(),
+                            &originColumns()})
     for (const Column& column : *table)
       visit(column);
 }
@@ -486,40 +517,49 @@ bindSource(PatchesClass& type)
           "What extract() has to say, a text each: what was assumed or left out.");
 }
 
-} // namespace
+py::tuple
+meshesOf(const PatchesObject& self, const py::object& spacing_m)
+{
+  std::optional<double> spacing;
+  read("spacing", spacing_m, spacing);
+  std::vector<double> vertices;
+  std::vector<std::int32_t> triangles, owners;
+  {
+    const py::gil_scoped_release release;
+    for (std::size_t i = 0; i < self.list.size(); ++i)
+      if (isUsable(self.list[i]->fit.status)) {
+        append(meshOf(self.list[i]->fit.patch, spacing), vertices, triangles);
+        owners.resize(triangles.size() / 3, static_cast<std::int32_t>(i));
+      }
+  }
+  const auto rows = [](std::size_t numbers) {
+    return static_cast<py::ssize_t>(numbers / 3);
+  };
+  const py::ssize_t vertex_count = rows(vertices.size());
+  const py::ssize_t triangle_count = rows(triangles.size());
+  return py::make_tuple(keptArray(std::move(vertices), {vertex_count, 3}),
+                        keptArray(std::move(triangles), {triangle_count, 3}),
+                        keptArray(std::move(owners), {triangle_count}));
+}
 
 void
-bindPatches(py::module_& module)
+bindContainer(PatchesClass& type)
 {
-  bindPatch(module);
-  PatchesClass type(
-      module,
-      "Patches",
-      "Patches in a row, and what they have as read-only arrays of N rows, made once\n"
-      "when first asked for and shared from then on.\n\n"
-      "`patches[3]` is a Patch; a slice, a mask or numbers give Patches, whose arrays "
-      "are\n"
-      "views after a slice: patches[patches.surface == 'sphere'], "
-      "patches[:10].centre.");
-  visitColumns([&](const Column& column) {
-    const Column* kept = &column;
-    type.def_property_readonly(
-        column.name,
-        [kept](PatchesObject& self) { return columnOf(self, *kept); },
-        column.help);
-  });
-  bindSource(type);
   type.def("__len__", [](const PatchesObject& self) { return self.list.size(); })
       .def("__getitem__", itemOf, py::arg("choice"))
       .def("__iter__",
            [](const py::object& self) {
              return py::reinterpret_steal<py::object>(PySeqIter_New(self.ptr()));
            })
-      .def("__repr__",
-           [](const PatchesObject& self) {
-             return "<holdfast.Patches: " + std::to_string(self.list.size()) + ">";
-           })
-      .def(
+      .def("__repr__", [](const PatchesObject& self) {
+        return "<holdfast.Patches: " + std::to_string(self.list.size()) + ">";
+      });
+}
+
+void
+bindQuestions(PatchesClass& type)
+{
+  type.def(
           "mask",
           [](const PatchesObject& self, const py::object& type_name) {
             const std::string word = readText("type", type_name);
@@ -548,12 +588,46 @@ bindPatches(py::module_& module)
             return out;
           },
           "to_dict() -> dict of str: array\n\nAll arrays by name.")
+      .def("mesh",
+           meshesOf,
+           py::arg("spacing") = py::none(),
+           "mesh(spacing=None) -> (vertices (V, 3), triangles (T, 3), owners (T,))\n\n"
+           "All patches as one mesh; owners[t] is the number of the patch that "
+           "triangle t\n"
+           "belongs to. `spacing` as for Patch.mesh().")
       .def("to_json",
            jsonOf,
            "to_json() -> str\n\n"
            "One JSON object in the format of the program's results (holdfast fit "
            "--json);\n"
            "numbers survive the way to text and back bit for bit.");
+}
+
+} // namespace
+
+void
+bindPatches(py::module_& module)
+{
+  bindPatch(module);
+  PatchesClass type(
+      module,
+      "Patches",
+      "Patches in a row, and what they have as read-only arrays of N rows, made once\n"
+      "when first asked for and shared from then on.\n\n"
+      "`patches[3]` is a Patch; a slice, a mask or numbers give Patches, whose arrays "
+      "are\n"
+      "views after a slice: patches[patches.surface == 'sphere'], "
+      "patches[:10].centre.");
+  visitColumns([&](const Column& column) {
+    const Column* kept = &column;
+    type.def_property_readonly(
+        column.name,
+        [kept](PatchesObject& self) { return columnOf(self, *kept); },
+        column.help);
+  });
+  bindSource(type);
+  bindContainer(type);
+  bindQuestions(type);
 }
 
 } // namespace holdfast::python

@@ -220,6 +220,8 @@ def test_of_maps(tmp_path, kinect):
         made.move(np.zeros((4, 4)), np.eye(6))
     with pytest.raises(ValueError, match="organized"):
         made.update(POINTS)
+    with pytest.raises(OSError, match="no_folder"):
+        made.save(tmp_path / "no_folder" / "map")
     with pytest.raises(ValueError, match="no_map"):
         holdfast.PatchMap.load(tmp_path / "no_map", kinect)
 

@@ -134,6 +134,15 @@ def test_whole(rocks, kinect):
     assert patches[0].surface == "plane"
 
 
+def test_one_mesh_of_all(patches):
+    vertices, triangles, owners = patches.mesh()
+    assert len(owners) == len(triangles) and triangles.max() == len(vertices) - 1
+    alone, its = patches[2].mesh()
+    np.testing.assert_array_equal(
+        vertices[triangles[owners == 2]], alone[its]
+    )
+
+
 def test_json_is_that_of_the_program(patches):
     made = json.loads(patches.to_json())
     assert len(made["patches"]) == len(patches)
