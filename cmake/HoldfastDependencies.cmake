@@ -34,7 +34,7 @@ option(HOLDFAST_WITH_PCL "Classes for PCL, files, programs" ${PCL_FOUND})
 if(NOT HOLDFAST_WITH_PCL)
   # Plain variables, which go before the options of the same names.
   foreach(part BUILD_APPS BUILD_SAMPLES BUILD_BENCHMARKS BUILD_EXPERIMENTS
-      WITH_OPENNI2 WITH_VIEWER)
+      WITH_OPENNI2 WITH_VIEWER WITH_PYTHON)
     set(HOLDFAST_${part} OFF)
   endforeach()
   return()
@@ -71,6 +71,12 @@ if(NOT DEFINED HOLDFAST_WITH_VIEWER OR HOLDFAST_WITH_VIEWER)
     set(viewer_found OFF)
   endif()
   option(HOLDFAST_WITH_VIEWER "A window for holdfast live" ${viewer_found})
+endif()
+
+# The Python module, for the Python that has numpy and pybind11: Debian's, where another
+# one comes first in the path.
+if(NOT HOLDFAST_QUICKSTART AND (NOT DEFINED HOLDFAST_WITH_PYTHON OR HOLDFAST_WITH_PYTHON))
+  include(HoldfastPython)
 endif()
 
 if(HOLDFAST_BUILD_APPS)

@@ -6,7 +6,7 @@
 # the same folder as it would have been.
 if(HOLDFAST_QUICKSTART)
   foreach(part BUILD_TESTS BUILD_SAMPLES BUILD_BENCHMARKS BUILD_EXPERIMENTS
-      WITH_OPENNI2 WITH_VIEWER)
+      WITH_OPENNI2 WITH_VIEWER WITH_PYTHON)
     set(HOLDFAST_${part} OFF)
   endforeach()
 endif()

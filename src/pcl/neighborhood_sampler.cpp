@@ -3,6 +3,7 @@
 #include "sampling_budget.h"
 
 #include "ball_grid.h"
+#include "nearest_points.h"
 #include "path_search.h"
 #include "pixel_disc.h"
 #include "seeds.h"
@@ -11,7 +12,6 @@
 #include "validation/patch_rays.h"
 
 #include <pcl/common/point_tests.h>
-#include <pcl/kdtree/kdtree_flann.h>
 
 #include <algorithm>
 #include <array>
@@ -45,8 +45,8 @@ struct NeighborhoodSampler::Scratch {
   std::vector<PathEnd> heap;
   std::vector<float> path_length;
   std::vector<int> ball;
-  pcl::Indices found;
-  std::vector<float> squared_distances;
+  std::vector<PathEnd> nearest;
+  std::vector<int> found;
 };
 
 void
@@ -57,8 +57,6 @@ NeighborhoodSampler::ScratchDeleter::operator()(Scratch* scratch) const
 
 struct NeighborhoodSampler::Impl {
   Impl(const RangeCloud& the_cloud, const Sensor& the_sensor, const SamplerOptions& o);
-
-  void buildTree();
 
   bool isValid(int index) const;
   std::vector<int> validPoints() const;
@@ -104,7 +102,7 @@ struct NeighborhoodSampler::Impl {
   std::optional<PixelGrid> grid;
   std::vector<double> column_slopes; ///< x/z of the grid's columns
   std::optional<BallGrid> balls; ///< without a pixel grid
-  pcl::KdTreeFLANN<pcl::PointXYZ> tree{false}; ///< for the nearest points
+  NearestPoints nearest_points; ///< where they are asked for
 };
 
 namespace {
@@ -138,18 +136,7 @@ NeighborhoodSampler::Impl::Impl(const RangeCloud& the_cloud,
   if (!grid && !nearest)
     balls.emplace(points, validPoints(), options.radius_m);
   if (nearest || (!grid && options.neighborhood == Neighborhood::Geodesic))
-    buildTree();
-}
-
-void
-NeighborhoodSampler::Impl::buildTree()
-{
-  const std::vector<int> valid = validPoints();
-  // The tree prints an error of its own when there is nothing to put into it.
-  if (valid.empty())
-    return;
-  tree.setInputCloud(cloud.points,
-                     pcl::make_shared<const pcl::Indices>(valid.begin(), valid.end()));
+    nearest_points = NearestPoints(points, validPoints());
 }
 
 bool
@@ -396,10 +383,7 @@ NeighborhoodSampler::Impl::treeGeodesic(int seed,
   paths.run([&](int slot, float length) {
     const int from = within[static_cast<std::size_t>(slot)];
     // One more, since the point itself is the nearest.
-    tree.nearestKSearch(points[from],
-                        kNeighbors + 1,
-                        scratch.found,
-                        scratch.squared_distances);
+    nearest_points.search(points[from], kNeighbors + 1, scratch.nearest, scratch.found);
     for (const int to : scratch.found)
       if (const int next = slotOf(to); next >= 0)
         paths.reach(next, length + distance(from, to));
@@ -414,12 +398,11 @@ NeighborhoodSampler::Impl::knn(int seed,
                                Scratch& scratch,
                                std::vector<int>& indices) const
 {
-  tree.nearestKSearch(points[seed],
-                      static_cast<unsigned>(options.k),
-                      scratch.found,
-                      scratch.squared_distances);
-  indices.assign(scratch.found.begin(), scratch.found.end());
-  // Among points at the same place the tree may choose others than the seed.
+  nearest_points.search(points[seed],
+                        static_cast<std::size_t>(options.k),
+                        scratch.nearest,
+                        indices);
+  // Of more points than that at the same place the tree chooses the first.
   if (std::find(indices.begin(), indices.end(), seed) == indices.end())
     indices.back() = seed;
   std::sort(indices.begin(), indices.end());

@@ -83,7 +83,7 @@ public:
 
   /// Refers to the cloud, which must outlive the sampler. Sorts the points of an
   /// unorganized cloud into cubes, which takes about its memory again, and builds a k-d
-  /// tree, of three times that, only for Knn, and Geodesic in unorganized clouds.
+  /// tree, of as much, only for Knn, and Geodesic in unorganized clouds.
   /// \throw std::invalid_argument when an option or the cloud makes no sense.
   NeighborhoodSampler(const RangeCloud& cloud,
                       const Sensor& sensor,

@@ -1,0 +1,37 @@
+# Finds a Python with numpy and pybind11, and sets HOLDFAST_WITH_PYTHON: on when found.
+if(NOT Python_EXECUTABLE)
+  find_program(holdfast_path_python NAMES python3)
+  find_program(holdfast_system_python NAMES python3 PATHS /usr/bin NO_DEFAULT_PATH)
+  foreach(candidate IN ITEMS ${holdfast_path_python} ${holdfast_system_python})
+    execute_process(COMMAND ${candidate} -c "import numpy, pybind11"
+      RESULT_VARIABLE failed OUTPUT_QUIET ERROR_QUIET)
+    if(NOT failed)
+      set(Python_EXECUTABLE ${candidate} CACHE FILEPATH "Python of the module")
+      break()
+    endif()
+  endforeach()
+  unset(holdfast_path_python CACHE)
+  unset(holdfast_system_python CACHE)
+endif()
+
+set(python_found OFF)
+if(Python_EXECUTABLE)
+  find_package(Python 3.9 QUIET COMPONENTS Interpreter Development.Module)
+  execute_process(COMMAND ${Python_EXECUTABLE} -m pybind11 --cmakedir
+    OUTPUT_VARIABLE pybind11_dir OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
+  set(PYBIND11_FINDPYTHON ON)
+  find_package(pybind11 2.10 QUIET HINTS ${pybind11_dir})
+  if(Python_FOUND AND pybind11_FOUND)
+    set(python_found ON)
+  endif()
+endif()
+# A module with sanitizers needs a Python that was started with them.
+if(python_found AND PROJECT_IS_TOP_LEVEL AND NOT HOLDFAST_SANITIZE)
+  option(HOLDFAST_WITH_PYTHON "The Python module" ON)
+else()
+  option(HOLDFAST_WITH_PYTHON "The Python module" OFF)
+endif()
+if(HOLDFAST_WITH_PYTHON AND NOT python_found)
+  message(FATAL_ERROR "HOLDFAST_WITH_PYTHON needs a Python (Python_EXECUTABLE) with its "
+    "headers, numpy and pybind11: python3-dev python3-numpy python3-pybind11 pybind11-dev")
+endif()

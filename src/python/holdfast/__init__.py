@@ -1,0 +1,50 @@
+"""Bounded curved contact patches with full covariance from depth clouds.
+
+    >>> import holdfast
+    >>> patch = holdfast.fit(points, covariances)       # one patch: help(holdfast.fit)
+    >>> sensor = holdfast.Sensor.load("kinect_v1")
+    >>> patches = holdfast.extract(image, sensor)       # all of an image
+
+Lengths are in metres, angles in radians, curvatures in 1/m; cameras look along +z with
+x to the right and y down. Arrays of another kind than float64 in C order are copied.
+"""
+
+import os as _os
+
+from . import _core
+from ._core import (
+    Patch,
+    Patches,
+    PatchMap,
+    Sensor,
+    Simulation,
+    __version__,
+    calibrate,
+    extract,
+    fit,
+    fit_many,
+    scene_names,
+    simulate,
+)
+
+_core._set_sensor_folder(_os.path.join(_os.path.dirname(__file__), "sensors"))
+
+__all__ = [
+    "Patch",
+    "PatchMap",
+    "Patches",
+    "Sensor",
+    "Simulation",
+    "__version__",
+    "calibrate",
+    "extract",
+    "fit",
+    "fit_many",
+    "scene_names",
+    "simulate",
+]
+
+# What users see, in messages and in help().
+for _thing in (Patch, Patches, PatchMap, Sensor, Simulation):
+    _thing.__module__ = __name__
+del _thing
