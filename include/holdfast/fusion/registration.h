@@ -24,7 +24,7 @@ struct RegistrationOptions {
   /// Directions of the pose (scaled to the sensor's distance from the patches) whose
   /// information is below this share of the largest are not observable: flat ground
   /// tells nothing of x, y and yaw. They stay as the guess has them.
-  double smallest_information = 1e-3;
+  double smallest_information = 1e-4;
   int min_pairs = 6;
 };
 
@@ -47,8 +47,8 @@ struct RegistrationResult {
   int iterations = 0;
   int pairs = 0; ///< measurements that counted in the end
   int gated = 0; ///< measurements with a patch near that the gate refused
-  int unmatched =
-      0; ///< without a patch near, or whose patch another one matched better
+  /// Without a patch near, or whose patch another one matched better.
+  int unmatched = 0;
   /// Sum of the squared Mahalanobis distances of the pairs; six for each on average.
   double chi2 = 0.0;
 };
