@@ -514,6 +514,35 @@ TEST_F(ExperimentProgram, MapWalksThroughAScene)
   EXPECT_EQ(patches, all);
 }
 
+// Five frames of a tripod before a table: F7 and F11 of what maps are to reach. Their
+// pixels share errors, which no number of frames averages.
+TEST_F(ExperimentProgram, MapOfAStillCameraIsAsSureAsItShould)
+{
+  const std::string cloud = test::recordedCloud("mosd_static_learn17.pcd");
+  if (cloud.empty())
+    GTEST_SKIP() << "no recorded clouds: set HOLDFAST_DATA_DIR";
+  const std::string folder = std::filesystem::path(cloud).parent_path().string();
+  const test::ProgramRun run = experiment({"map", "--recorded", folder, "--json", "-"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const Json json = Json::parse(run.out);
+  int judged = 0;
+  for (const Json& row : json.at("rows")) {
+    if (row.at("of") != "all")
+      continue;
+    SCOPED_TRACE(row.dump());
+    EXPECT_GT(row.at("patches"), 50);
+    const double nees = row.at("nees_per_dof");
+    if (row.at("poses") == "still, as if independent") {
+      EXPECT_GT(nees, 4.0);
+      continue;
+    }
+    ++judged;
+    EXPECT_GT(nees, 0.5);
+    EXPECT_LT(nees, 1.7);
+  }
+  EXPECT_GE(judged, 2); // of the first frame, and of all
+}
+
 TEST_F(ExperimentProgram, WritesTableAndFiles)
 {
   const std::string out = folder_ + "/new/results";

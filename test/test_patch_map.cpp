@@ -317,7 +317,7 @@ struct World {
   std::vector<Pose> anchors; ///< true, frame of the map
   std::vector<JetVector> jets;
 
-  World(int count, double steepness, Random& random)
+  World(int count, double steepness, Random& random, double curvature = 5.0)
   {
     for (int i = 0; i < count; ++i) {
       const Eigen::Vector3d place(random.uniform(-0.6, 0.6),
@@ -330,18 +330,22 @@ struct World {
            place});
       JetVector jet = JetVector::Zero();
       for (int k = 3; k < 6; ++k)
-        jet[k] = 5.0 * random.normal();
+        jet[k] = curvature * random.normal();
       jets.push_back(jet);
     }
   }
 
   /// As seen from a pose, about anchors that are off by some millimetres.
-  std::vector<Measurement> measure(const Pose& sensor, Random& random) const
+  /// \param shift by which all are off, m, in the plane of each.
+  std::vector<Measurement> measure(
+      const Pose& sensor,
+      Random& random,
+      const Eigen::Vector2d& shift = Eigen::Vector2d::Zero()) const
   {
     std::vector<Measurement> measurements;
     for (std::size_t i = 0; i < anchors.size(); ++i) {
       Pose offset;
-      offset.c.head<2>() = 0.003 * random.normalVector().head<2>();
+      offset.c.head<2>() = shift + 0.003 * random.normalVector().head<2>();
       const auto moved = movedJet(jets[i], offset);
       Measurement m = measurementAt(i + 1, {0.0, 0.0, 1.0}, &random);
       m.jet.value += moved->value;
@@ -385,6 +389,44 @@ TEST(Registration, FindsThePoseWithItsCovariance)
               1e3 * std::sqrt(squares.tail<3>().mean()));
   EXPECT_LT(nees, 1.3);
   EXPECT_GT(nees, 0.7);
+}
+
+// What a wrong guess asks for lies beside the anchors, all of it to one side. With
+// curvatures that are hardly more than their noise, this would draw the pose there.
+TEST(Registration, IsNotPulledToItsGuess)
+{
+  constexpr int kTrials = 60;
+  const Eigen::Vector2d shift(0.012, 0.0);
+  double nees = 0.0, sum = 0.0, squares = 0.0;
+  for (std::uint64_t trial = 0; trial < kTrials; ++trial) {
+    Random random(trial);
+    const World world(300, 0.0, random, 1.5);
+    PatchMapOptions options;
+    options.max_tilt_rad = 1.0;
+    PatchMap map(options);
+    map.update(world.measure(Pose(), random));
+    Pose guess;
+    guess.c = world.anchors.front().R * Eigen::Vector3d(-shift.x(), -shift.y(), 0.0);
+    const RegistrationResult result =
+        registerPatches(world.measure(Pose(), random, shift), map, guess);
+    ASSERT_EQ(result.status, RegistrationStatus::Converged);
+    ASSERT_EQ(result.null_space.cols(), 0);
+    JetVector error;
+    error << logMap(result.pose.R), result.pose.c;
+    nees += error.dot(result.covariance.inverse() * error) / 6.0 / kTrials;
+    const double pulled = error.tail<3>().dot(guess.c.normalized());
+    sum += pulled;
+    squares += pulled * pulled;
+  }
+  const double mean = sum / kTrials;
+  const double deviation = std::sqrt((squares / kTrials - mean * mean) / (kTrials - 1));
+  std::printf("  NEES/dof %.3f, pulled by %.3f +- %.3f mm of %.0f\n",
+              nees,
+              1e3 * mean,
+              1e3 * deviation,
+              1e3 * shift.norm());
+  EXPECT_LT(std::abs(mean), 4.0 * deviation);
+  EXPECT_LT(nees, 1.3);
 }
 
 TEST(Registration, SaysWhatAPlaneDoesNotTell)

@@ -1,6 +1,7 @@
 // Maps of patches from walks through simulated scenes, against the truth.
 #include "experiment.h"
 #include "input_options.h"
+#include "map_stills.h"
 #include "map_walk.h"
 #include "spots.h"
 
@@ -25,6 +26,7 @@ struct MapChoice {
   int stride = 2;
   double odometry_mrad = 1.0, odometry_mm = 2.0;
   std::string sensor = "xtion";
+  std::string recorded; ///< folder; empty: walks
 };
 
 const std::vector<WalkRule>&
@@ -144,6 +146,7 @@ emptyRow(const std::string& scene, const std::string& rule, const std::string& g
                           "lost",
                           "open",
                           "gated",
+                          "uncertain",
                           "ms_frame",
                           "ms_update"})
     row[key] = Json();
@@ -186,6 +189,12 @@ addPatches(const Group& group, const std::vector<MapPatchError>& patches, Json& 
         row["single_sigma_mm"].get<double>() / row["height_sigma_mm"].get<double>();
 }
 
+int
+measurementsOf(const UpdateReport& u)
+{
+  return u.fused + u.born + u.gated + u.replaced + u.surplus + u.uncertain + u.unfit;
+}
+
 /// What the frames of all walks say, for the row of all patches.
 void
 addFrames(const std::vector<WalkOutcome>& walks, Json& row)
@@ -193,6 +202,7 @@ addFrames(const std::vector<WalkOutcome>& walks, Json& row)
   Mean drift, rotation, translation, milliseconds, update;
   ErrorComparison increments;
   int lost = 0, open = 0, gated = 0, taken = 0, edges = 0, patches = 0, frames = 0;
+  int uncertain = 0, measured = 0;
   for (const WalkOutcome& walk : walks) {
     frames += static_cast<int>(walk.frames.size());
     if (walk.frames.empty())
@@ -208,6 +218,8 @@ addFrames(const std::vector<WalkOutcome>& walks, Json& row)
       open += frame.is_open ? 1 : 0;
       gated += frame.update.gated + frame.update.replaced;
       taken += frame.update.fused;
+      uncertain += frame.update.uncertain;
+      measured += measurementsOf(frame.update);
       if (frame.squared_rad) {
         rotation.add(1e6 * *frame.squared_rad);
         translation.add(1e6 * *frame.squared_m);
@@ -233,6 +245,8 @@ addFrames(const std::vector<WalkOutcome>& walks, Json& row)
   row["open"] = open;
   row["gated"] =
       gated + taken > 0 ? Json(static_cast<double>(gated) / (gated + taken)) : Json();
+  row["uncertain"] =
+      measured > 0 ? Json(static_cast<double>(uncertain) / measured) : Json();
   row["ms_frame"] = milliseconds.value();
   row["ms_update"] = update.value();
 }
@@ -240,7 +254,7 @@ addFrames(const std::vector<WalkOutcome>& walks, Json& row)
 /// \param walks of one rule
 void
 addRows(const std::string& scene,
-        const WalkRule& rule,
+        const std::string& rule,
         const std::vector<WalkOutcome>& walks,
         std::vector<Json>& rows)
 {
@@ -248,12 +262,24 @@ addRows(const std::string& scene,
   for (const WalkOutcome& walk : walks)
     patches.insert(patches.end(), walk.patches.begin(), walk.patches.end());
   for (const Group& group : groups()) {
-    Json row = emptyRow(scene, rule.name, group.name);
+    Json row = emptyRow(scene, rule, group.name);
     addPatches(group, patches, row);
     if (&group == &groups().back())
       addFrames(walks, row);
     rows.push_back(row);
   }
+}
+
+/// What is printed.
+std::vector<Json>
+rowsShown(const std::vector<Json>& rows)
+{
+  std::vector<Json> shown;
+  for (const Json& row : rows)
+    for (const char* name : {"1 view", "4-7 views", "16 or more", "all"})
+      if (row["of"] == name)
+        shown.push_back(row);
+  return shown;
 }
 
 Series
@@ -320,6 +346,7 @@ describe(const MapChoice& choice, Report& report)
                     {"lost", "lost"},
                     {"open", "open"},
                     {"gated", "gated"},
+                    {"uncertain", "uncertain"},
                     {"ms/frame", "ms_frame"},
                     {"ms/update", "ms_update"}};
   const std::vector<std::string> failures = report.remarks;
@@ -350,7 +377,8 @@ describe(const MapChoice& choice, Report& report)
       "frames "
       "without a pose, open: with a direction that patches do not tell; gated: share "
       "of "
-      "the measurements that the map refused; ms/update: of the map alone."};
+      "the measurements that the map refused; uncertain: share of all that are too "
+      "uncertain for it; ms/update: of the map alone."};
   report.remarks.insert(report.remarks.end(), failures.begin(), failures.end());
 }
 
@@ -377,6 +405,35 @@ addPlot(const MapChoice& choice,
                                             "sigma of the height (mm)",
                                             true));
   }
+}
+
+/// Of a camera that stood still, about the plane before it.
+Report
+runStills(const MapChoice& choice, const ExperimentSettings& settings)
+{
+  static const std::vector<StillRule> all_rules{
+      {"still, first frame", true, true},
+      {"still", false, true},
+      {"still, as if independent", false, false}};
+  Report report;
+  describe(choice, report);
+  report.remarks = {
+      "Frames that a camera recorded from one pose, fused without motion. Each patch "
+      "of "
+      "the map that lies on the largest plane, about the mean of that plane over the "
+      "frames: NEES/dof of the height, the slopes, the curvatures and all six. The "
+      "pattern of a pose is estimated from the frames of the other poses; as if "
+      "independent: without it. What the whole plane is bent counts as an error here."};
+  RecordingOptions recordings;
+  recordings.folder = choice.recorded;
+  recordings.sensor_name = choice.sensor;
+  const auto outcomes =
+      mapStills(recordings, all_rules, settings.threads, settings.seed, report.remarks);
+  for (std::size_t rule = 0; rule < all_rules.size(); ++rule)
+    for (const StillOutcome& still : outcomes[rule])
+      addRows(still.scene, all_rules[rule].name, {still.map}, report.rows);
+  report.summary = rowsShown(report.rows);
+  return report;
 }
 
 Report
@@ -414,12 +471,9 @@ runMap(const MapChoice& choice, const ExperimentSettings& settings)
         by_rule[i].push_back(std::move(outcomes[i]));
     }
     for (std::size_t i = 0; i < by_rule.size(); ++i)
-      addRows(scene, rules()[i], by_rule[i], report.rows);
+      addRows(scene, rules()[i].name, by_rule[i], report.rows);
   }
-  for (const Json& row : report.rows)
-    for (const char* shown : {"1 view", "4-7 views", "16 or more", "all"})
-      if (row["of"] == shown)
-        report.summary.push_back(row);
+  report.summary = rowsShown(report.rows);
   describe(choice, report);
   addPlot(choice, first_walks, report);
   return report;
@@ -455,6 +509,14 @@ addChoices(CLI::App& command, MapChoice& choice)
                   "Error of its way per frame and axis, mm")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
+  command
+      .add_option(
+          "--recorded",
+          choice.recorded,
+          "In place of walks the frames mosd_*.pcd there that a camera recorded "
+          "from one pose, about the table before it")
+      ->type_name("FOLDER")
+      ->check(CLI::ExistingDirectory);
   addSensorOption(command, choice.sensor);
 }
 
@@ -465,7 +527,8 @@ mapExperiment()
 {
   Experiment experiment;
   experiment.name = "map";
-  experiment.summary = "Maps of patches from simulated walks, against the truth";
+  experiment.summary =
+      "Maps of patches from simulated walks, or of a recorded table, against the truth";
   experiment.trials_meaning = "walks through each scene, whose noise differs";
   experiment.default_trials = 1;
   experiment.fewest_trials = 1;
@@ -473,7 +536,8 @@ mapExperiment()
     const auto choice = std::make_shared<MapChoice>();
     addChoices(command, *choice);
     return [choice](const ExperimentSettings& settings) {
-      return runMap(*choice, settings);
+      return choice->recorded.empty() ? runMap(*choice, settings) :
+                                        runStills(*choice, settings);
     };
   };
   return experiment;

@@ -181,14 +181,15 @@ private:
   void addRegistration(std::size_t k,
                        const Pose& before,
                        const RegistrationResult& result,
-                       WalkFrame& frame) const
+                       WalkFrame& frame)
   {
     frame.is_lost = result.status != RegistrationStatus::Converged;
     frame.is_open = !frame.is_lost && result.null_space.cols() > 0;
     if (frame.is_lost)
       return;
+    // From the last frame that was found.
     const Pose found = before.inverse() * result.pose;
-    const Pose truth = truth_[k - 1].inverse() * truth_[k];
+    const Pose truth = truth_[last_found_].inverse() * truth_[k];
     JetVector error;
     error << logMap(truth.R.transpose() * found.R), found.c - truth.c;
     frame.squared_rad = error.head<3>().squaredNorm() / 3.0;
@@ -199,6 +200,7 @@ private:
     turned.covariance = T * result.covariance * T.transpose();
     turned.null_space = T * result.null_space;
     frame.observed = observedError(error, turned);
+    last_found_ = k;
   }
 
   void record(std::size_t k)
@@ -251,6 +253,7 @@ private:
   FrameMapper mapper_;
   FrameSimulator camera_;
   std::map<std::uint64_t, Sighting> sightings_;
+  std::size_t last_found_ = 0; ///< frame of which registration found the pose
   WalkOutcome outcome_;
 };
 

@@ -48,4 +48,6 @@ if [[ -n $recordings ]]; then
   # with that of the other poses.
   run . real --data recordings --seed 7
   run leave_one_out real --data recordings --seed 7 --leave-one-out
+  # What a map makes of a camera that stood still.
+  run still map --recorded recordings --seed 7
 fi

@@ -126,6 +126,20 @@ momentsCovariance(const MapPatch& patch, const Eigen::Matrix2d& W)
   return T * packed.matrix() * T.transpose();
 }
 
+/// What they are at a level takes longer than all else here.
+const DiscriminationThresholds&
+thresholdsAt(double level)
+{
+  struct Known {
+    double level;
+    DiscriminationThresholds thresholds;
+  };
+  thread_local Known last{level, DiscriminationThresholds::atLevel(level)};
+  if (last.level != level)
+    last = {level, DiscriminationThresholds::atLevel(level)};
+  return last.thresholds;
+}
+
 PatchType
 typeOf(const JetVector& jet, const JetMatrix& P, const FitOptions& options)
 {
@@ -133,7 +147,7 @@ typeOf(const JetVector& jet, const JetMatrix& P, const FitOptions& options)
       options.surface == SurfaceRequest::Auto ?
           discriminate(jet.tail<3>(),
                        P.bottomRightCorner<3, 3>(),
-                       DiscriminationThresholds::atLevel(options.discrimination_level),
+                       thresholdsAt(options.discrimination_level),
                        options) :
       jet[3] * jet[5] < jet[4] * jet[4] ? SurfaceType::HyperbolicParaboloid :
                                           SurfaceType::EllipticParaboloid;

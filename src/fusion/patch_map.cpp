@@ -560,17 +560,16 @@ PatchMap::restart(const Measurement& m,
   patch.id = id;
   patch.anchor = anchor;
   patch.radius_m = radius_m;
+  addView(m, anchor, patch); // which tells how rough it is
   Jet jet = m.jet;
-  jet.white += modelError(m.design.by_third,
-                          thirdToJetOfDisc(radius_m),
-                          options_.s3_floor_per_m2);
+  jet.white +=
+      modelError(m.design.by_third, thirdToJetOfDisc(radius_m), roughnessOf(patch));
   if (pose_covariance_)
     jet.white += errorOf(*pose_covariance_, jet.value, anchor);
   patch.jet = JetFilter(jet);
   beginEpochOf(m, patch);
   patch.epochs = 1;
   patch.taken_in = patch.last_seen = frames_;
-  addView(m, anchor, patch);
 }
 
 void

@@ -1,5 +1,6 @@
 #include <holdfast/pcl/frame_mapping.h>
 
+#include <holdfast/geometry/rotation.h>
 #include <holdfast/pcl/intrinsics.h>
 
 #include <Eigen/Cholesky>
@@ -81,6 +82,13 @@ poseCovariance(const RegistrationResult& result, const JetMatrix& prior)
   const Eigen::MatrixXd inverse =
       information.llt().solve(Eigen::MatrixXd::Identity(N.cols(), N.cols()));
   return result.covariance + N * inverse * N.transpose();
+}
+
+/// The motion that goes on like this one, for so many times as long.
+Pose
+power(const Pose& motion, double times)
+{
+  return {expMap(times * logMap(motion.R)), times * motion.c};
 }
 
 } // namespace
@@ -243,7 +251,7 @@ FrameReport
 FrameMapper::addUnknown(const RangeCloud& frame)
 {
   FrameReport report;
-  const Pose guess = map_.pose() * last_increment_;
+  const Pose guess = map_.pose() * power(step_, 1 + frames_missed_);
   const Measured measured = measure(frame, guess, report);
   if (map_.patches().empty() || moveByRegistration(measured, guess, report))
     update(measured, report);
@@ -256,19 +264,28 @@ FrameMapper::moveByRegistration(const Measured& measured,
                                 FrameReport& report)
 {
   const Pose before = map_.pose();
-  RegistrationResult result =
-      registerPatches(measured.measurements, map_, guess, options_.registration);
+  const auto registered = [&](const Pose& from) {
+    return registerPatches(measured.measurements, map_, from, options_.registration);
+  };
+  RegistrationResult result = registered(guess);
+  // Who has stopped is where he was.
+  if (result.status != RegistrationStatus::Converged)
+    if (RegistrationResult still = registered(before);
+        still.status == RegistrationStatus::Converged)
+      result = std::move(still);
   const bool is_found = result.status == RegistrationStatus::Converged;
   if (is_found) {
     // To the axes of the frame before, which increments are in.
     JetMatrix T = JetMatrix::Identity();
     T.bottomRightCorner<3, 3>() = before.R.transpose();
-    last_increment_ = before.inverse() * result.pose;
-    map_.move(last_increment_,
+    const Pose increment = before.inverse() * result.pose;
+    map_.move(increment,
               T * poseCovariance(result, priorCovariance(options_)) * T.transpose());
+    step_ = power(increment, 1.0 / (1 + frames_missed_));
+    frames_missed_ = 0;
   }
   else {
-    last_increment_ = Pose();
+    ++frames_missed_;
   }
   report.registration = std::move(result);
   return is_found;

@@ -57,9 +57,8 @@ Pose ownAnchor(const FitResult& fit);
 /// plane claims a curvature of exactly zero. What is fused should be fitted as
 /// SurfaceRequest::Paraboloid, since the choice of a type is in no covariance.
 /// \param by_third the jet is that of the quadric about the anchor's axis which fits
-/// the
-///        surface best in the sense of a fit: a paraboloid about another axis is none
-///        about this one, and has third derivatives there.
+///        the surface best in the sense of a fit: a paraboloid about another axis is
+///        none about this one, and has third derivatives there.
 /// \return nothing where the fit is not usable, or the anchor's z axis misses the
 /// surface or meets it at more than 84 degrees from its normal.
 std::optional<Jet> jetAt(const FitResult& fit,

@@ -2,10 +2,9 @@
 ///
 ///     PatchMap map(options);
 ///     for each frame:
-///       map.move(increment, covariance);              // not where the sensor stood
-///       still seeds = map.wantedSeeds(camera);              // fit there, and where
-///       none is report = map.update(measurements);            // measurementOf(fit,
-///       points)
+///       map.move(increment, covariance);       // not where the sensor stood still
+///       seeds = map.wantedSeeds(camera);       // fit there, and where none is
+///       report = map.update(measurements);     // measurementOf(fit, points)
 ///
 /// What is common to a frame does not average: the map is robot-centric. Anchors lie
 /// fixed in a frame of the map, the sensor moves through it by the increments it is
@@ -48,8 +47,9 @@ struct PatchMapOptions {
   /// angle it is seen under (at least 35 degrees) tells too little to be fused: the
   /// covariance that comes with it follows its own error, and what errs to the one side
   /// would count more than what errs to the other (`experiment map`: NEES/dof by sigma
-  /// of the slope).
-  double max_uncertainty_rad = 0.05;
+  /// of the slope). Half of it maps less of what is far, so that patches have fewer
+  /// views and poses fewer pairs.
+  double max_uncertainty_rad = 0.1;
   /// Root mean square third derivative that every surface is granted, 1/m^2, and how
   /// large it may become before a misfit (chi2 over twice its expectation) makes a
   /// patch of half the radius.
@@ -155,8 +155,7 @@ public:
 
   /// The sensor moved: `increment` is its new pose in its old frame.
   /// \param covariance of (delta, c), R <- R Exp(delta), c in the axes of the old
-  /// frame,
-  ///        rad and m.
+  ///        frame, rad and m.
   /// \throw std::invalid_argument when a pose is none, or the covariance is zero, not
   /// symmetric or not positive semi-definite: a motion known exactly is a claim that
   /// nobody can make. A sensor that stood still does not move.
@@ -301,8 +300,8 @@ private:
 /// The patch as one of the fits knows them, frame of the map: type by the tests of
 /// stage I-3 on the fused curvatures, bounds from the moments of its support. The
 /// centre is the surface's point on the anchor's axis, so that its covariance is along
-/// that axis alone. chi2 is the sum over all views. \param options what is a plane and
-/// how much of the support bounds enclose; `surface`
+/// that axis alone. chi2 is the sum over all views.
+/// \param options what is a plane and how much of the support bounds enclose; `surface`
 ///        is Auto or Paraboloid.
 /// \throw std::invalid_argument for other requests.
 FitResult toFitResult(const MapPatch& patch, const FitOptions& options = {});

@@ -22,9 +22,10 @@ struct RegistrationOptions {
   /// keep them going.
   double step_tolerance_sigma = 0.03;
   /// Directions of the pose (scaled to the sensor's distance from the patches) whose
-  /// information is below this share of the largest are not observable: flat ground
-  /// tells nothing of x, y and yaw. They stay as the guess has them.
-  double smallest_information = 1e-3;
+  /// information is below this share of the largest, or below three times what errors
+  /// of slopes alone would seem to tell, are not observable: flat ground tells nothing
+  /// of x, y and yaw. They stay as the guess has them.
+  double smallest_information = 1e-4;
   int min_pairs = 6;
 };
 
@@ -39,16 +40,17 @@ struct RegistrationResult {
   RegistrationStatus status = RegistrationStatus::TooFewPairs;
   Pose pose; ///< of the sensor, frame of the map
   /// Of (delta, c), R <- R Exp(delta), c in the axes of the map, rad and m: of what the
-  /// data tell, zero along the null space. The map counts as if its patches did not
-  /// share errors.
+  /// data tell, zero along the null space. Of the pattern, patches of the frame that
+  /// are near each other in the view share the error; those of the map count as if they
+  /// shared none.
   JetMatrix covariance = JetMatrix::Zero();
   /// Unit directions of (delta, c) that the data do not determine, one column each.
   Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 6> null_space{6, 0};
   int iterations = 0;
   int pairs = 0; ///< measurements that counted in the end
   int gated = 0; ///< measurements with a patch near that the gate refused
-  int unmatched =
-      0; ///< without a patch near, or whose patch another one matched better
+  /// Without a patch near, or whose patch another one matched better.
+  int unmatched = 0;
   /// Sum of the squared Mahalanobis distances of the pairs; six for each on average.
   double chi2 = 0.0;
 };

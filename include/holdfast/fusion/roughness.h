@@ -34,8 +34,7 @@ FitDesign designOf(const PointBatch& batch, const Pose& anchor);
 
 /// The same fit as another anchor has it.
 /// \param pose of the fit's own anchor in that other one; how the two are tilted to
-/// each
-///        other does not count.
+///        each other does not count.
 ThirdToJet movedThirdToJet(const ThirdToJet& own, const Pose& pose);
 
 /// By how much the best quadric of one fit differs, as a covariance of jets at the

@@ -26,8 +26,7 @@ public:
   /// the result depends on the frames so far alone. A frame of another size starts
   /// anew.
   /// \param former as for extractPatches(): of the last frame, so that none takes
-  /// memory
-  ///        for its patches.
+  ///        memory for its patches.
   /// \throw std::invalid_argument when the cloud is not organized, and as
   /// extractPatches().
   ExtractionResult extract(const RangeCloud& frame, ExtractionResult former = {});

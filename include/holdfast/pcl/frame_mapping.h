@@ -62,7 +62,8 @@ public:
   /// The same from a sensor of which nobody knows how it has moved: registerPatches()
   /// finds it, from where the last motion goes on. What that leaves open is as
   /// uncertain as MappingOptions says. Where it fails (FrameReport::registration) the
-  /// map stays as it is, and the next frame begins where the last one was found.
+  /// map stays as it is, and the next frame is looked for where that motion, gone on
+  /// for longer, leads.
   FrameReport addUnknown(const RangeCloud& frame);
 
   const PatchMap& map() const
@@ -85,7 +86,8 @@ private:
   std::optional<Sensor> matched_; ///< with the camera on whose pixels the frames lie
   MappingOptions options_;
   PatchMap map_;
-  Pose last_increment_; ///< of a motion that was found
+  Pose step_; ///< from frame to frame, of the last motion that was found
+  int frames_missed_ = 0; ///< since
 };
 
 /// The options of a map for a sensor: how far the errors of its pixels reach.
