@@ -391,6 +391,43 @@ TEST(Registration, FindsThePoseWithItsCovariance)
   EXPECT_GT(nees, 0.7);
 }
 
+// All heights of the second frame are off by the same: a pattern that reaches over the
+// whole view. Counted once for each of 300 patches it would be claimed away.
+TEST(Registration, CountsASharedErrorOnce)
+{
+  constexpr int kTrials = 60;
+  constexpr double kShared = 2e-3; // m
+  double nees = 0.0, height = 0.0, claimed = 0.0;
+  for (std::uint64_t trial = 0; trial < kTrials; ++trial) {
+    Random random(trial);
+    const World world(300, 0.0, random);
+    PatchMapOptions options;
+    options.max_tilt_rad = 1.0;
+    options.pattern = singleWave(100.0);
+    PatchMap map(options);
+    map.update(world.measure(Pose(), random));
+    std::vector<Measurement> frame = world.measure(Pose(), random);
+    const double shared = kShared * random.normal();
+    for (Measurement& m : frame) {
+      m.jet.value[0] += shared;
+      m.jet.pattern(0, 0) = kShared * kShared;
+    }
+    const RegistrationResult result = registerPatches(frame, map, Pose());
+    ASSERT_EQ(result.status, RegistrationStatus::Converged);
+    JetVector error;
+    error << logMap(result.pose.R), result.pose.c;
+    nees += error.dot(result.covariance.inverse() * error) / 6.0 / kTrials;
+    height += error[5] * error[5] / kTrials;
+    claimed += result.covariance(5, 5) / kTrials;
+  }
+  std::printf("  NEES/dof %.3f; height %.3f mm, claimed %.3f mm\n",
+              nees,
+              1e3 * std::sqrt(height),
+              1e3 * std::sqrt(claimed));
+  EXPECT_LT(nees, 1.3);
+  EXPECT_GT(claimed, 0.5 * kShared * kShared);
+}
+
 // What a wrong guess asks for lies beside the anchors, all of it to one side. With
 // curvatures that are hardly more than their noise, this would draw the pose there.
 TEST(Registration, IsNotPulledToItsGuess)

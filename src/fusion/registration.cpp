@@ -8,6 +8,7 @@
 #include <Eigen/Eigenvalues>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -128,17 +129,28 @@ sharersAmong(const std::vector<Measurement>& measurements,
   double longest = 0.0;
   for (const PatternReach& wave : waves)
     longest = std::max(longest, wave.length);
+  std::vector<Eigen::Vector2d> directions;
+  for (const Measurement& m : measurements)
+    directions.push_back(direction(m));
+  constexpr int kSteps = 64; // of a table: there are a million pairs in a frame
   std::vector<JetVector> sharers;
   for (const Measurement& m : measurements) {
     // A disc is as wide as a Gaussian of half its radius.
     const double support = 0.5 * m.radius_m / m.anchor.c.z();
     constexpr double kReach = 3.0; // of the correlation, exp(-4.5) there
-    const double farthest = kReach * std::hypot(longest, std::sqrt(2.0) * support);
+    const double step =
+        kReach * std::hypot(longest, std::sqrt(2.0) * support) / (kSteps - 1);
+    std::array<Eigen::Vector3d, kSteps> correlation;
+    for (int i = 0; i < kSteps; ++i)
+      correlation[static_cast<std::size_t>(i)] =
+          patternCorrelation(waves, support, i * step);
+    const Eigen::Vector2d here = direction(m);
     Eigen::Vector3d sum = Eigen::Vector3d::Zero(); // with itself
-    for (const Measurement& other : measurements)
-      if (const double moved = (direction(other) - direction(m)).norm();
-          moved < farthest)
-        sum += patternCorrelation(waves, support, moved);
+    for (const Eigen::Vector2d& there : directions) {
+      const auto i = static_cast<std::size_t>((there - here).norm() / step + 0.5);
+      if (i < correlation.size())
+        sum += correlation[i];
+    }
     JetVector& numbers = sharers.emplace_back();
     numbers << sum[0], sum[1], sum[1], sum[2], sum[2], sum[2];
     numbers = numbers.cwiseMax(1.0);
