@@ -20,7 +20,7 @@ constexpr const char* kExamples = R"(Examples:
 This program was built by samples/quickstart.sh, which leaves out all commands but
 these two. From the folder of the project,
   cmake -S . -B build && cmake --build build
-builds the others as well: live, record, map, risk, render, calibrate, simulate,
+builds the others as well: live, record, map, risk, render, report, calibrate, simulate,
 experiment.
 'holdfast COMMAND --help' explains a command.
 Exit codes: 0 all done, 1 something failed, 2 wrong usage.
@@ -34,6 +34,8 @@ constexpr const char* kExamples = R"(Examples:
   holdfast live                             patches of a depth camera, as they come
   holdfast render results/rocks.patches.json -o rocks.png
                                             and as a picture
+  holdfast report results/rocks.patches.json -o rocks.html
+                                            and as a page to look around in
   holdfast fit can.pcd --whole --surface cylinder --json -
                                             one patch to all points, as JSON
   holdfast map frames/ --poses trajectory.txt -o map.json
@@ -76,6 +78,7 @@ run(int argc, char** argv)
   holdfast::app::addMapCommand(app, exit_code);
   holdfast::app::addRiskCommand(app, exit_code);
   holdfast::app::addRenderCommand(app, exit_code);
+  holdfast::app::addReportCommand(app, exit_code);
   holdfast::app::addCalibrateCommand(app, exit_code);
   holdfast::app::addSimulateCommand(app, exit_code);
 #endif

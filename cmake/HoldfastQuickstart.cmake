@@ -16,8 +16,10 @@ set(quickstart_without
   src/sensor/pattern_calibration
   src/uncertainty/stagewise src/uncertainty/second_order
   src/pcl/frame_extraction src/pcl/frame_mapping src/pcl/map_conversions
-  src/io/patch_map_file src/io/foot_file src/io/atomic_folder src/io/range_frame src/io/trajectory_file
-  apps/calibrate/ apps/map/ apps/risk/ apps/simulate/ apps/plot.cpp
+  src/io/patch_map_file src/io/foot_file src/io/atomic_folder src/io/range_frame
+  src/io/trajectory_file
+  apps/calibrate/ apps/map/ apps/report/ apps/risk/ apps/simulate/ apps/plot.cpp
+  apps/result_input.cpp
   # All but what images of --dense are drawn with.
   apps/render/render.cpp apps/render/render_scene apps/render/render_settings
   apps/render/patch_support apps/render/view apps/render/render_risk

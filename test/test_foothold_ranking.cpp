@@ -95,14 +95,19 @@ TEST(FootholdRanking, IsThatOfTheContactItself)
   for (const Foothold& foothold : rankFootholds(map, smallFoot(), options).footholds) {
     const MapPatch* patch = map.find(foothold.patch);
     ASSERT_NE(patch, nullptr);
-    const ContactRisk alone =
-        contactRisk(contactSurfaceOf(map, *patch), smallFoot(), foothold.placement);
+    const ContactRisk alone = contactRisk(
+        contactSurfaceOf(map, *patch, surfacePriorOf(map, options.load_direction)),
+        smallFoot(),
+        foothold.placement);
     ASSERT_TRUE(alone.quality);
     EXPECT_NEAR(alone.quality->risk.total, foothold.risk.quality->risk.total, 1e-4);
     // No other yaw is better.
     Placement first = foothold.placement;
-    for (const ContactRisk& other :
-         contactRisks(contactSurfaceOf(map, *patch), smallFoot(), first, options.yaws))
+    for (const ContactRisk& other : contactRisks(
+             contactSurfaceOf(map, *patch, surfacePriorOf(map, options.load_direction)),
+             smallFoot(),
+             first,
+             options.yaws))
       if (other.quality) {
         EXPECT_GE(other.quality->risk.total, foothold.risk.quality->risk.total - 1e-4);
       }

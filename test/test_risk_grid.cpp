@@ -109,8 +109,11 @@ TEST(RiskGrid, SaysWhatASingleContactSays)
       double nearest = 1.0;
       for (const MapPatch& patch : map.patches()) {
         Placement best = placement;
-        const ContactRisk risk =
-            bestYaw(contactSurfaceOf(map, patch), smallFoot(), best, options.yaws);
+        const ContactRisk risk = bestYaw(
+            contactSurfaceOf(map, patch, surfacePriorOf(map, options.load_direction)),
+            smallFoot(),
+            best,
+            options.yaws);
         if (risk.quality)
           nearest = std::min(nearest, std::abs(risk.quality->risk.total - total));
       }

@@ -34,7 +34,8 @@ experiments()
           pclExperiment(),
           realExperiment(),
           fusionExperiment(),
-          mapExperiment()};
+          mapExperiment(),
+          riskExperiment()};
 }
 
 struct ExperimentArguments {

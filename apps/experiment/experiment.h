@@ -44,6 +44,7 @@ Experiment pclExperiment();
 Experiment realExperiment();
 Experiment fusionExperiment();
 Experiment mapExperiment();
+Experiment riskExperiment();
 
 /// Adds --data DIR, the folder of recorded clouds (also from the environment variable
 /// HOLDFAST_DATA_DIR). `folder` must outlive the parsing.

@@ -3,28 +3,21 @@
 #include "render_risk.h"
 #include "render_scene.h"
 #include "render_settings.h"
+#include "result_input.h"
 #include "stroke_font.h"
 
 #include <holdfast/geometry/constants.h>
 #include <holdfast/io/atomic_file.h>
-#include <holdfast/io/cloud_io.h>
 #include <holdfast/io/patch_io.h>
 #include <holdfast/patch/tessellation.h>
-#include <holdfast/pcl/intrinsics.h>
 #include <holdfast/simulation/reference_scenes.h>
-
-#include <pcl/common/point_tests.h>
 
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <memory>
 
 namespace holdfast::app {
@@ -60,102 +53,19 @@ constexpr int kTitleHeight = 20; // px, of one line
 struct Subject {
   std::string title;
   std::vector<ExtractedPatch> patches;
-  PicturePoints points;
-  Pose sensor_pose;
-  bool seen = false; ///< by a camera in that pose
+  SeenCloud cloud;
   std::vector<Rgb> colors; ///< of the patches one by one; empty: as the legend has them
   std::vector<PictureSole> soles;
 };
 
+/// The cloud of a result. \throw std::runtime_error when it cannot be found.
 std::string
-readText(const std::string& path)
+cloudOf(const std::string& result, const std::string& cloud)
 {
-  std::error_code ignored;
-  if (fs::is_directory(path, ignored))
-    throw std::runtime_error(path + ": is a directory, no result");
-  errno = 0;
-  std::ifstream file(path, std::ios::binary);
-  if (!file)
-    throw std::runtime_error(path + ": cannot be read: " + std::strerror(errno));
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
-PatchReport
-readResult(const std::string& path)
-{
-  const std::string text = readText(path);
-  if (text.find("\"footholds\":") != std::string::npos)
-    throw std::runtime_error(path + ": is a result of 'holdfast risk': --color risk "
-                                    "draws it");
-  try {
-    PatchReport report = readJson(text);
-    if (report.result.patches.empty())
-      throw std::runtime_error("has no patch");
-    for (const ExtractedPatch& patch : report.result.patches)
-      if (const std::string error = validityError(patch.fit.patch);
-          !error.empty() && !(report.is_of_map && !isUsable(patch.fit.status)))
-        throw std::runtime_error("has an impossible patch: " + error);
-    return report;
-  }
-  catch (const std::exception& error) {
-    throw std::runtime_error(path + ": " + error.what());
-  }
-}
-
-/// The cloud of a result, which may have moved together with it.
-std::string
-findCloud(const std::string& result, const std::string& cloud)
-{
-  const fs::path folder = fs::path(result).parent_path();
-  for (const fs::path& candidate :
-       {fs::path(cloud), folder / cloud, folder / fs::path(cloud).filename()}) {
-    std::error_code ignored;
-    if (fs::is_regular_file(candidate, ignored))
-      return candidate.string();
-  }
+  if (auto found = findCloud(result, cloud))
+    return *found;
   throw std::runtime_error(result + ": its cloud " + cloud +
                            " is neither here nor beside it: --cloud FILE tells where");
-}
-
-PicturePoints
-picturePoints(const RangeCloud& cloud,
-              const std::vector<std::array<std::uint8_t, 3>>& colors)
-{
-  PicturePoints points;
-  for (std::size_t i = 0; i < cloud.points->size(); ++i) {
-    const pcl::PointXYZ& point = (*cloud.points)[i];
-    if (!pcl::isFinite(point))
-      continue;
-    points.positions.emplace_back(point.getVector3fMap().cast<double>());
-    if (colors.size() == cloud.points->size())
-      points.colors.push_back(colors[i]);
-  }
-  return points;
-}
-
-/// False for scans from all sides and clouds whose file does not tell the sensor's
-/// pose: no depth camera sees more than 45 degrees to a side.
-bool
-isSeenFrom(const Pose& sensor, const std::vector<Eigen::Vector3d>& points)
-{
-  const auto aside =
-      std::count_if(points.begin(), points.end(), [&](const auto& point) {
-        const Eigen::Vector3d q = sensor.toLocal(point);
-        return q.head<2>().cwiseAbs().maxCoeff() > q.z();
-      });
-  return 10 * static_cast<std::size_t>(aside) < points.size();
-}
-
-/// At most `count` of the patches, spread evenly over their order.
-std::vector<ExtractedPatch>
-evenShare(const std::vector<ExtractedPatch>& patches, std::size_t count)
-{
-  if (count >= patches.size())
-    return patches;
-  std::vector<ExtractedPatch> share;
-  for (std::size_t i = 0; i < count; ++i)
-    share.push_back(patches[i * patches.size() / count]);
-  return share;
 }
 
 /// Those that are to be drawn. What a map knows too little of to be a patch cannot be,
@@ -191,9 +101,9 @@ mapSubject(const std::string& name, std::vector<ExtractedPatch> patches)
   Subject subject;
   for (const ExtractedPatch& patch : patches) {
     const Mesh mesh = tessellate(patch.fit.patch, kSpacing);
-    subject.points.positions.insert(subject.points.positions.end(),
-                                    mesh.vertices.begin(),
-                                    mesh.vertices.end());
+    subject.cloud.points.positions.insert(subject.cloud.points.positions.end(),
+                                          mesh.vertices.begin(),
+                                          mesh.vertices.end());
   }
   subject.title = fmt::format("{}, {} patches", name, patches.size());
   subject.patches = std::move(patches);
@@ -205,22 +115,14 @@ Subject
 cloudSubject(const std::string& path, const RenderSettings& settings)
 {
   const Sensor sensor = loadSensorOption(settings.input.sensor_name);
-  CloudFileInfo info;
-  LoadOptions options = loadOptions(settings.input, sensor);
-  options.colors = true;
-  const RangeCloud raw = loadCloud(path, options, &info);
   std::vector<std::string> notices;
-  const RangeCloud cloud =
-      withoutPatternMap(path, raw, matchedSensor(sensorOf(info, sensor), raw), notices);
+  Subject subject;
+  subject.cloud =
+      loadSeenCloud(path, loadOptions(settings.input, sensor), sensor, notices);
   for (const std::string& notice : notices)
     if (!settings.quiet)
       printNotice(path + ": " + notice);
-
-  Subject subject;
-  subject.points = picturePoints(cloud, info.colors);
-  subject.sensor_pose = cloud.sensor_pose;
-  subject.seen = isSeenFrom(cloud.sensor_pose, subject.points.positions);
-  if (!subject.seen && !settings.aside && !settings.quiet)
+  if (!subject.cloud.seen && !settings.aside && !settings.quiet)
     printNotice(path + ": not seen from a sensor, so drawn as with --view iso");
   return subject;
 }
@@ -228,7 +130,7 @@ cloudSubject(const std::string& path, const RenderSettings& settings)
 Subject
 riskSubject(const std::string& result, const RenderSettings& settings)
 {
-  const std::string text = readText(result);
+  const std::string text = readResultText(result);
   RiskPicture risk;
   try {
     risk = readRisk(text);
@@ -242,7 +144,7 @@ riskSubject(const std::string& result, const RenderSettings& settings)
   else if (risk.is_of_map)
     subject = mapSubject(risk.source, risk.patches);
   else
-    subject = cloudSubject(findCloud(result, risk.source), settings);
+    subject = cloudSubject(cloudOf(result, risk.source), settings);
   subject.title = fmt::format("{}, {} footholds on {} patches",
                               fs::path(risk.source).filename().string(),
                               risk.soles.size(),
@@ -258,12 +160,18 @@ loadSubject(const std::string& result, const RenderSettings& settings)
 {
   if (settings.risk)
     return riskSubject(result, settings);
-  const PatchReport report = readResult(result);
+  const std::string text = readResultText(result);
+  if (text.find("\"footholds\":") != std::string::npos)
+    throw std::runtime_error(result + ": is a result of 'holdfast risk': --color risk "
+                                      "draws it");
+  const PatchReport report = parseResult(result, text);
+  if (report.result.patches.empty())
+    throw std::runtime_error(result + ": has no patch");
   std::vector<ExtractedPatch> patches = patchesOf(result, report, settings);
   if (report.is_of_map && settings.cloud.empty())
     return mapSubject(report.cloud, std::move(patches));
   const std::string path =
-      settings.cloud.empty() ? findCloud(result, report.cloud) : settings.cloud;
+      settings.cloud.empty() ? cloudOf(result, report.cloud) : settings.cloud;
   Subject subject = cloudSubject(path, settings);
   subject.patches = std::move(patches);
   subject.title = fmt::format("{}, {} {}",
@@ -273,35 +181,13 @@ loadSubject(const std::string& result, const RenderSettings& settings)
   return subject;
 }
 
-/// The middle of the points.
-Eigen::Vector3d
-centroid(const std::vector<Eigen::Vector3d>& points)
-{
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3d& point : points)
-    sum += point;
-  return sum / static_cast<double>(points.size());
-}
-
 View
 viewFromAside(const Subject& subject, const Aside& aside)
 {
-  const Eigen::Matrix3d& R = subject.sensor_pose.R;
-  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
-  if (subject.seen && R.isIdentity()) // the frame of the camera
-    up = -Eigen::Vector3d::UnitY();
-  Eigen::Vector3d front = Eigen::Vector3d::UnitX();
-  if (subject.seen) {
-    const Eigen::Vector3d towards_sensor =
-        subject.sensor_pose.c - centroid(subject.points.positions);
-    // From straight above, the lower edge of the image is the front.
-    front = towards_sensor - towards_sensor.dot(up) * up;
-    if (front.norm() < 1e-3 * towards_sensor.norm())
-      front = R.col(1) - R.col(1).dot(up) * up;
-  }
+  const Standpoint standpoint = standpointOf(subject.cloud);
   const double radian = kPi / 180.0;
-  return View::orbit(front.normalized(),
-                     up,
+  return View::orbit(standpoint.front,
+                     standpoint.up,
                      radian * aside.azimuth,
                      radian * aside.elevation);
 }
@@ -309,8 +195,8 @@ viewFromAside(const Subject& subject, const Aside& aside)
 View
 viewOf(const Subject& subject, const RenderSettings& settings)
 {
-  return subject.seen && !settings.aside ?
-             View::perspective(subject.sensor_pose) :
+  return subject.cloud.seen && !settings.aside ?
+             View::perspective(subject.cloud.sensor_pose) :
              viewFromAside(subject, settings.aside.value_or(Aside()));
 }
 
@@ -370,16 +256,16 @@ drawSubject(Canvas& canvas,
             const RenderSettings& settings)
 {
   View view = viewOf(subject, settings);
-  view.fit(subject.points.positions, frame, settings.zoom);
+  view.fit(subject.cloud.points.positions, frame, settings.zoom);
   canvas.clip(frame);
-  drawPoints(canvas, view, frame, subject.points);
+  drawPoints(canvas, view, frame, subject.cloud.points);
   // Glass shows what lies behind it, which has to be there first.
   std::vector<std::pair<double, std::size_t>> from_afar;
   for (std::size_t i = 0; i < subject.patches.size(); ++i)
     if (const auto at = view.project(subject.patches[i].fit.patch.c))
       from_afar.emplace_back(at->nearness, i);
   std::sort(from_afar.begin(), from_afar.end());
-  const PatchSupport support(subject.points.positions);
+  const PatchSupport support(subject.cloud.points.positions);
   for (const auto& [nearness, i] : from_afar) {
     const FitResult& fit = subject.patches[i].fit;
     const bool has_own = !subject.colors.empty();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "patch_support.h"
+#include "result_input.h"
 #include "view.h"
 
 #include <holdfast/patch/patch.h>
@@ -9,12 +10,6 @@
 #include <cstdint>
 
 namespace holdfast::app {
-
-/// The finite points of a cloud, to be drawn.
-struct PicturePoints {
-  std::vector<Eigen::Vector3d> positions; ///< world frame, m
-  std::vector<Rgb> colors; ///< one each, or empty: grey, shaded by their surface
-};
 
 /// Draws points as discs just large enough to touch their neighbours.
 void drawPoints(Canvas& canvas,

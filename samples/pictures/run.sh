@@ -19,6 +19,18 @@ cd "$work"
 "$holdfast" render rocks.patches.json -o "$here/rocks_sigma.png" --size 800x610 \
   --color sigma-normal
 
+# The page of a report, as a browser shows it; pngquant, where it is, makes it smaller.
+if command -v chromium >/dev/null; then
+  mkdir page
+  "$holdfast" fit "$here/../rocks.pcd" -o page --quiet --radius 0.06 --spacing 0.11
+  "$holdfast" report page/rocks.patches.json --cloud "$here/../rocks.pcd" -o page.html
+  chromium --headless --no-sandbox --use-gl=angle --use-angle=swiftshader \
+    --enable-unsafe-swiftshader --hide-scrollbars --window-size=1100,800 \
+    --virtual-time-budget=20000 --screenshot="$here/report.png" \
+    "file://$work/page.html#patch=140" 2>/dev/null
+  ! command -v pngquant >/dev/null || pngquant --force --ext .png "$here/report.png"
+fi
+
 # Where a flat foot may step, from one frame of a camera that looks down by 45 degrees,
 # and from a map of twelve.
 "$holdfast" simulate boulder_field --trajectory walk --frames 12 --stride 2 -o walk

@@ -33,18 +33,6 @@ requireValid(const std::string& error)
 
 } // namespace
 
-ContactSurface
-contactSurfaceOf(const PatchMap& map, const MapPatch& patch)
-{
-  ContactSurface surface;
-  surface.jet = {patch.jet.value(), patch.jet.covariance(), JetMatrix::Zero()};
-  surface.anchor = patch.anchor;
-  surface.support = patch.support;
-  surface.radius_m = patch.radius_m;
-  surface.s3_per_m2 = map.roughnessOf(patch);
-  return surface;
-}
-
 std::optional<ContactSurface>
 contactSurfaceOf(const FitResult& fit)
 {

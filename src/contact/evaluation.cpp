@@ -32,7 +32,97 @@ normalOf(const Eigen::Vector2d& slope)
   return Eigen::Vector3d(-slope.x(), -slope.y(), 1.0).normalized();
 }
 
+/// Off the sole by N(mean, sigma^2) at each of its places.
+struct Residuals {
+  Eigen::VectorXd mean, sigma;
+
+  Residuals(const SoleAtYaw& sole, const Field& field)
+  : mean(sole.rows * field.shapeMean() - sole.own)
+  , sigma((sole.rows * field.shapeFactor()).rowwise().norm())
+  {}
+};
+
 } // namespace
+
+FieldRisk::FieldRisk(const Field& field,
+                     const Foot& foot,
+                     const Eigen::Vector2d& planned_slope)
+: field_(field), foot_(foot), planned_slope_(planned_slope), lines_(field)
+{
+  const Eigen::Vector2d slope = field.mean.segment<2>(1);
+  const Eigen::Matrix2d covariance = field.slopeCovariance();
+  common_.slip = slipProbability(slope, covariance, foot.friction);
+  common_.height = outsideProbability(field.mean[0],
+                                      field.factor.row(0).norm(),
+                                      foot.tolerances.height_m);
+  if (foot.ankle == Ankle::Stiff)
+    common_.tilt = 1.0 - discProbability(slope - planned_slope,
+                                         covariance,
+                                         std::tan(foot.tolerances.tilt_rad));
+}
+
+ContactEvents
+FieldRisk::at(const SoleAtYaw& extremes)
+{
+  ContactEvents risk = common_;
+  risk.gap = gapOf(extremes);
+  risk.total = risk.slip + risk.height + risk.tilt + risk.gap;
+  risk.joint = jointOf(risk, extremes);
+  return risk;
+}
+
+double
+FieldRisk::gapOf(const SoleAtYaw& extremes)
+{
+  const double limit = foot_.tolerances.gap_m;
+  const Residuals off(extremes, field_);
+  double sum = 0.0, largest = -1.0;
+  Eigen::Index leading = 0;
+  for (Eigen::Index i = 0; i < off.mean.size(); ++i) {
+    const double p = outsideProbability(off.mean[i], off.sigma[i], limit);
+    sum += p;
+    if (p > largest) {
+      largest = p;
+      leading = i;
+    }
+  }
+  if (sum < kNegligible)
+    return sum;
+  lines_.setDirection(inField(extremes.rows.row(leading).transpose()));
+  lines_.keepShape(extremes.rows, extremes.own, limit);
+  return std::clamp(lines_.outside(), largest, std::max(largest, std::min(sum, 1.0)));
+}
+
+double
+FieldRisk::jointOf(const ContactEvents& risk, const SoleAtYaw& extremes)
+{
+  const double slope = std::max(risk.slip, risk.tilt);
+  const double largest = std::max({risk.height, risk.gap, slope});
+  if (risk.total - largest <= kNegligible)
+    return std::min(risk.total, 1.0);
+  if (risk.gap < largest || risk.gap < kNegligible) {
+    lines_.setDirection(risk.height == largest ? FieldVector(FieldVector::Unit(0)) :
+                                                 steepest());
+    lines_.keepShape(extremes.rows, extremes.own, foot_.tolerances.gap_m);
+  } // else the lines are as gapOf() has left them
+  lines_.keepHeight(foot_.tolerances.height_m);
+  lines_.keepFriction(foot_.friction);
+  if (foot_.ankle == Ankle::Stiff)
+    lines_.keepSlope(planned_slope_, std::tan(foot_.tolerances.tilt_rad));
+  return std::clamp(lines_.outside(),
+                    largest,
+                    std::max(largest, std::min(risk.total, 1.0)));
+}
+
+FieldVector
+FieldRisk::steepest() const
+{
+  FieldVector event = FieldVector::Zero();
+  event.segment<2>(1) = field_.mean.segment<2>(1);
+  if (event.isZero(0.0))
+    event[1] = 1.0;
+  return event;
+}
 
 Evaluation::Evaluation(const ContactSurface& surface,
                        const Sole& sole,
@@ -62,26 +152,40 @@ Evaluation::atYaw(double turn)
   result.support_share = supportShare(turn);
   if (result.support_share < sole_.foot().tolerances.min_support)
     return result;
-  result.status = ContactStatus::Ok;
-  if (!common_)
-    workOutCommon();
+  if (parts_.empty())
+    workOutParts();
 
+  result.status = ContactStatus::Ok;
+  const SoleAtYaw extremes(sole_.extremes(surface_.isQuadric()), turn);
   ContactQuality& quality = result.quality.emplace();
   ContactEvents& risk = quality.risk;
-  risk = *common_;
+  risk = risksAt(extremes);
   risk.support = 1.0 - result.support_share;
-  const SolePlaces& places = sole_.extremes(surface_.s3_per_m2 == 0.0);
-  const Residuals extremes = residualsOf(places, turn);
-  risk.gap = gapOf(extremes, places.own);
-  const double sum = risk.slip + risk.height + risk.tilt + risk.gap + risk.support;
-  risk.total = std::min(sum, 1.0);
-  risk.joint = jointOf(risk, extremes, places.own);
-  Eigen::Index worst = 0;
-  (extremes.mean.cwiseAbs() + 2.0 * extremes.sigma).maxCoeff(&worst);
-  quality.cvar_gap_m = tailMean(extremes.mean[worst], extremes.sigma[worst], kWorst);
+  risk.total = std::min(risk.total + risk.support, 1.0);
+  risk.joint = 1.0 - (1.0 - risk.joint) * result.support_share;
+  quality.cvar_gap_m = worstGap(extremes);
   quality.contact_area_m2 = areaAt(turn);
   placeSole(turn, quality);
   return result;
+}
+
+void
+Evaluation::workOutParts()
+{
+  // FieldRisk refers to the field beside it: no part may move any more.
+  parts_.reserve(surface_.hypotheses.size() + 1);
+  for (const SurfaceHypothesis& hypothesis : surface_.hypotheses)
+    if (auto field = fieldAt(surface_, hypothesis, load_))
+      parts_.push_back({hypothesis.share, *field, std::nullopt});
+  if (parts_.empty())
+    parts_.push_back({1.0, *field_, std::nullopt});
+  double sum = 0.0;
+  for (const Part& part : parts_)
+    sum += part.share;
+  for (Part& part : parts_) {
+    part.share /= sum;
+    part.risk.emplace(part.field, sole_.foot(), planned_slope_);
+  }
 }
 
 double
@@ -102,106 +206,50 @@ Evaluation::supportShare(double turn) const
   return static_cast<double>(on_support) / static_cast<double>(cells.cols());
 }
 
-Evaluation::Residuals
-Evaluation::residualsOf(const SolePlaces& places, double turn) const
+ContactEvents
+Evaluation::risksAt(const SoleAtYaw& extremes)
 {
-  Residuals result;
-  result.rows = turnedRows(places.rows, turn);
-  result.mean = result.rows * field_->shapeMean() - places.own;
-  result.sigma = (result.rows * field_->shapeFactor()).rowwise().norm();
-  return result;
-}
-
-void
-Evaluation::workOutCommon()
-{
-  const Foot& foot = sole_.foot();
-  const Eigen::Vector2d slope = field_->mean.segment<2>(1);
-  const Eigen::Matrix2d covariance = field_->slopeCovariance();
-  ContactEvents& common = common_.emplace();
-  common.slip = slipProbability(slope, covariance, foot.friction);
-  common.height = outsideProbability(field_->mean[0],
-                                     field_->factor.row(0).norm(),
-                                     foot.tolerances.height_m);
-  if (foot.ankle == Ankle::Stiff)
-    common.tilt = 1.0 - discProbability(slope - planned_slope_,
-                                        covariance,
-                                        std::tan(foot.tolerances.tilt_rad));
-  lines_.emplace(*field_);
+  ContactEvents mean;
+  for (Part& part : parts_) {
+    const ContactEvents risk = part.risk->at(extremes);
+    for (double ContactEvents::*event : {&ContactEvents::slip,
+                                         &ContactEvents::height,
+                                         &ContactEvents::tilt,
+                                         &ContactEvents::gap,
+                                         &ContactEvents::total,
+                                         &ContactEvents::joint})
+      mean.*event += part.share * risk.*event;
+  }
+  return mean;
 }
 
 double
-Evaluation::gapOf(const Residuals& extremes, const Eigen::VectorXd& own)
+Evaluation::worstGap(const SoleAtYaw& extremes) const
 {
-  const double limit = sole_.foot().tolerances.gap_m;
-  double sum = 0.0, largest = -1.0;
-  Eigen::Index leading = 0;
-  for (Eigen::Index i = 0; i < own.size(); ++i) {
-    const double p = outsideProbability(extremes.mean[i], extremes.sigma[i], limit);
-    sum += p;
-    if (p > largest) {
-      largest = p;
-      leading = i;
-    }
+  const Residuals overall(extremes, *field_);
+  Eigen::Index worst = 0;
+  (overall.mean.cwiseAbs() + 2.0 * overall.sigma).maxCoeff(&worst);
+  std::vector<GaussianShare> shares;
+  for (const Part& part : parts_) {
+    const Residuals off(extremes, part.field);
+    shares.push_back({part.share, off.mean[worst], off.sigma[worst]});
   }
-  if (sum < kNegligible)
-    return sum;
-  lines_->setDirection(inField(extremes.rows.row(leading).transpose()));
-  lines_->keepShape(extremes.rows, own, limit);
-  return std::clamp(lines_->outside(), largest, std::min(sum, 1.0));
-}
-
-FieldVector
-Evaluation::leadingEvent(const ContactEvents& risk, const Residuals& extremes) const
-{
-  const double slope = std::max(risk.slip, risk.tilt);
-  if (risk.gap >= std::max(risk.height, slope)) {
-    Eigen::Index worst = 0;
-    (extremes.mean.cwiseAbs() + 2.0 * extremes.sigma).maxCoeff(&worst);
-    return inField(extremes.rows.row(worst).transpose());
-  }
-  FieldVector event = FieldVector::Unit(0);
-  if (slope > risk.height) {
-    event.setZero();
-    event.segment<2>(1) = field_->mean.segment<2>(1);
-    if (event.isZero(0.0))
-      event[1] = 1.0;
-  }
-  return event;
-}
-
-double
-Evaluation::jointOf(const ContactEvents& risk,
-                    const Residuals& extremes,
-                    const Eigen::VectorXd& own)
-{
-  const double largest = std::max({risk.slip, risk.height, risk.tilt, risk.gap});
-  const double sum = risk.slip + risk.height + risk.tilt + risk.gap;
-  double any = sum;
-  if (sum - largest > kNegligible) {
-    const Foot& foot = sole_.foot();
-    lines_->setDirection(leadingEvent(risk, extremes));
-    lines_->keepShape(extremes.rows, own, foot.tolerances.gap_m);
-    lines_->keepHeight(foot.tolerances.height_m);
-    lines_->keepFriction(foot.friction);
-    if (foot.ankle == Ankle::Stiff)
-      lines_->keepSlope(planned_slope_, std::tan(foot.tolerances.tilt_rad));
-    any = std::clamp(lines_->outside(), largest, std::min(sum, 1.0));
-  }
-  return 1.0 - (1.0 - std::min(any, 1.0)) * (1.0 - risk.support);
+  return tailMean(shares, kWorst);
 }
 
 double
 Evaluation::areaAt(double turn) const
 {
-  const SolePlaces& cells = sole_.cells();
-  const Residuals off = residualsOf(cells, turn);
+  const SoleAtYaw cells(sole_.cells(), turn);
+  const double limit = sole_.foot().tolerances.contact_m;
   double share = 0.0;
-  for (Eigen::Index i = 0; i < cells.size(); ++i)
-    share += 1.0 - outsideProbability(off.mean[i],
-                                      off.sigma[i],
-                                      sole_.foot().tolerances.contact_m);
-  return sole_.area() * share / static_cast<double>(cells.size());
+  for (const Part& part : parts_) {
+    const Residuals off(cells, part.field);
+    for (Eigen::Index i = 0; i < off.mean.size(); ++i)
+      share +=
+          part.share * (1.0 - outsideProbability(off.mean[i], off.sigma[i], limit));
+  }
+  return sole_.area() * share / static_cast<double>(cells.own.size());
 }
 
 void

@@ -12,29 +12,73 @@
 namespace holdfast::contact {
 namespace {
 
-/// Nodes of the field and one for friction.
-constexpr int kDimensions = kField + 1;
-using AllNodes = Eigen::Matrix<double, kDimensions, Lines::kLines>;
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-/// Standard normal numbers that fill the space evenly: multiples of the powers of the
-/// generalised golden ratio x^(d+1) = x + 1, modulo 1, and each with its negative, so
-/// that what is odd has no error.
+/// One direction is integrated along, the others and friction are drawn.
+constexpr int kDimensions = kField;
+
+/// A dimension of Sobol's sequence: degree and coefficients of its polynomial, and the
+/// first direction numbers (Joe and Kuo, SIAM J. Sci. Comput. 30, 2008).
+struct SobolDimension {
+  int degree;
+  unsigned polynomial;
+  unsigned first[5];
+};
+constexpr SobolDimension kSobol[] = {{1, 0, {1}},
+                                     {2, 1, {1, 3}},
+                                     {3, 1, {1, 3, 1}},
+                                     {3, 2, {1, 1, 1}},
+                                     {4, 1, {1, 1, 3, 3}},
+                                     {4, 4, {1, 3, 5, 13}},
+                                     {5, 2, {1, 1, 5, 5, 17}},
+                                     {5, 4, {1, 1, 5, 5, 5}},
+                                     {5, 7, {1, 1, 7, 11, 19}}};
+
+/// Point n of kLines of a dimension as a multiple of 1/kLines; dimension 0 is van der
+/// Corput's sequence.
+unsigned
+sobol(int dimension, unsigned n)
+{
+  unsigned direction[Lines::kLogLines];
+  for (int i = 0; i < Lines::kLogLines; ++i) {
+    direction[i] = 1;
+    if (dimension == 0)
+      continue;
+    const SobolDimension& d = kSobol[dimension - 1];
+    if (i < d.degree) {
+      direction[i] = d.first[i];
+      continue;
+    }
+    direction[i] = direction[i - d.degree] ^ (direction[i - d.degree] << d.degree);
+    for (int k = 1; k < d.degree; ++k)
+      if ((d.polynomial >> (d.degree - 1 - k) & 1U) != 0)
+        direction[i] ^= direction[i - k] << k;
+  }
+  unsigned point = 0;
+  for (int i = 0; i < Lines::kLogLines; ++i)
+    if ((n >> i & 1U) != 0)
+      point ^= direction[i] << (Lines::kLogLines - 1 - i);
+  return point;
+}
+
+/// Standard normal numbers that fill the space evenly.
+struct AllNodes {
+  Lines::Nodes field; ///< none in the direction of the lines
+  Lines::Row friction;
+};
+
 AllNodes
 makeNodes()
 {
-  double ratio = 1.0;
-  for (int i = 0; i < 60; ++i) // a contraction
-    ratio = std::pow(1.0 + ratio, 1.0 / (kDimensions + 1));
   AllNodes nodes;
-  for (int n = 0; n < Lines::kLines / 2; ++n) {
-    double step = 1.0;
+  nodes.field.setZero();
+  for (int n = 0; n < Lines::kLines; ++n)
     for (int i = 0; i < kDimensions; ++i) {
-      step /= ratio;
-      const double u = std::fmod(0.5 + (n + 1) * step, 1.0);
-      nodes(i, 2 * n) = std::sqrt(2.0) * boost::math::erf_inv(2.0 * u - 1.0);
-      nodes(i, 2 * n + 1) = -nodes(i, 2 * n);
+      const double u = (sobol(i, static_cast<unsigned>(n)) + 0.5) / Lines::kLines;
+      const double z = std::sqrt(2.0) * boost::math::erf_inv(2.0 * u - 1.0);
+      float& node = i + 1 < kDimensions ? nodes.field(i + 1, n) : nodes.friction[n];
+      node = static_cast<float>(z);
     }
-  }
   return nodes;
 }
 
@@ -43,6 +87,20 @@ allNodes()
 {
   static const AllNodes nodes = makeNodes();
   return nodes;
+}
+
+/// result = rows * nodes, without the packing that large products want.
+template <typename Factor>
+void
+multiply(const Factor& factor, const Lines::Nodes& nodes, Lines::Nodes& result)
+{
+  for (int i = 0; i < kField; ++i) {
+    auto row = result.row(i).array();
+    row = static_cast<float>(factor(i, 0)) * nodes.row(0).array();
+    for (int k = 1; k < kField; ++k)
+      if (factor(i, k) != 0.0)
+        row += static_cast<float>(factor(i, k)) * nodes.row(k).array();
+  }
 }
 
 /// Whether the load comes from the side that was seen, which is above the plane of the
@@ -78,31 +136,43 @@ semidefiniteRoot(const Eigen::Matrix<double, n, n>& S)
 } // namespace
 
 std::optional<Field>
-fieldAt(const ContactSurface& surface, const Pose& load)
+fieldAt(const ContactSurface& surface,
+        const SurfaceHypothesis& hypothesis,
+        const Pose& load)
 {
   // What the quadric of a disc leaves of third derivatives, at the load's origin.
   const ThirdToJet by_third = movedThirdToJet(thirdToJetOfDisc(surface.radius_m),
                                               load.inverse() * surface.anchor);
   const std::optional<Jet> jet =
-      transported(surface.jet, surface.anchor, load, by_third);
+      transported(hypothesis.jet, surface.anchor, load, by_third);
   if (!jet || !jet->value.allFinite() || !isSeenSide(jet->value, surface.anchor, load))
     return std::nullopt;
   static const Eigen::Matrix4d kRoot = semidefiniteRoot(unitThirdDerivatives());
   Field field;
   field.mean << jet->value, Eigen::Vector4d::Zero();
   field.factor.setZero();
-  field.factor.topLeftCorner<6, 6>() = semidefiniteRoot(jet->covariance());
-  const Eigen::Matrix4d third = surface.s3_per_m2 * kRoot;
+  // Curvatures first, so that what shows under a sole depends on the first nodes.
+  Eigen::PermutationMatrix<6> curvatures_first;
+  curvatures_first.indices() << 3, 4, 5, 0, 1, 2;
+  const JetMatrix covariance =
+      curvatures_first.transpose() * jet->covariance() * curvatures_first;
+  field.factor.topLeftCorner<6, 6>() =
+      curvatures_first * semidefiniteRoot<6>(covariance);
+  const Eigen::Matrix4d third = hypothesis.s3_per_m2 * kRoot;
   field.factor.bottomRightCorner<4, 4>() = third;
   field.factor.topRightCorner<6, 4>() = -by_third * third;
   return field.factor.allFinite() ? std::optional(field) : std::nullopt;
 }
 
-Lines::Lines(const Field& field)
-: field_(field)
-, places_(field.factor * allNodes().topRows<kField>())
-, along_(FieldVector::Zero())
+std::optional<Field>
+fieldAt(const ContactSurface& surface, const Pose& load)
 {
+  return fieldAt(surface, {1.0, surface.jet, surface.s3_per_m2}, load);
+}
+
+Lines::Lines(const Field& field) : field_(field)
+{
+  multiply(field.factor, allNodes().field, places_);
   setDirection(FieldVector::Unit(0));
 }
 
@@ -112,31 +182,31 @@ Lines::setDirection(const FieldVector& event)
   FieldVector direction = field_.factor.transpose() * event;
   const double length = direction.norm();
   direction = length > 0.0 ? FieldVector(direction / length) : FieldVector::Unit(0);
-  along_ = field_.factor * direction;
-  const Row feet = direction.transpose() * allNodes().topRows<kField>();
-  starts_ = places_;
-  starts_.noalias() -= along_ * feet.matrix();
-  starts_.colwise() += field_.mean;
-  clear();
-}
-
-void
-Lines::clear()
-{
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  along_ = (field_.factor * direction).cast<float>();
+  // The reflection that takes the first axis to the direction takes the nodes, which
+  // are across the one, across the other.
+  const FieldVector mirror =
+      direction + (direction[0] > 0.0 ? 1.0 : -1.0) * FieldVector::Unit(0);
+  const auto scaled = (mirror * (2.0 / mirror.squaredNorm())).cast<float>().eval();
+  Row feet = Row::Zero();
+  for (int k = 1; k < kField; ++k)
+    feet += scaled[k] * allNodes().field.row(k).array();
+  const auto step = (field_.factor * mirror).cast<float>().eval();
+  for (int i = 0; i < kField; ++i)
+    starts_.row(i) =
+        places_.row(i).array() - step[i] * feet + static_cast<float>(field_.mean[i]);
   low_.setConstant(-kInfinity);
   high_.setConstant(kInfinity);
 }
 
 void
-Lines::keepWithin(const Row& middle, double along, double limit)
+Lines::keepWithin(const Row& middle, float along, float limit)
 {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  if (std::abs(along) < std::numeric_limits<double>::min()) {
+  if (std::abs(along) < std::numeric_limits<float>::min()) {
     low_ = (middle.abs() > limit).select(kInfinity, low_);
     return;
   }
-  const double inverse = 1.0 / along, half = limit * std::abs(inverse);
+  const float inverse = 1.0F / along, half = limit * std::abs(inverse);
   low_ = low_.max(-inverse * middle - half);
   high_ = high_.min(-inverse * middle + half);
 }
@@ -144,51 +214,54 @@ Lines::keepWithin(const Row& middle, double along, double limit)
 void
 Lines::keepShape(const ShapeRows& rows, const Eigen::VectorXd& own, double limit)
 {
-  const ShapeVector along = along_.tail<kShape>();
   for (Eigen::Index i = 0; i < rows.rows(); ++i) {
-    const Row middle = (rows.row(i) * starts_.bottomRows<kShape>()).array() - own[i];
-    keepWithin(middle, rows.row(i).dot(along), limit);
+    const Eigen::Matrix<float, 1, kShape> row = rows.row(i).cast<float>();
+    Row middle = row[0] * starts_.row(kShapeStart).array() - static_cast<float>(own[i]);
+    for (int k = 1; k < kShape; ++k)
+      middle += row[k] * starts_.row(kShapeStart + k).array();
+    keepWithin(middle, row.dot(along_.tail<kShape>()), static_cast<float>(limit));
   }
 }
 
 void
 Lines::keepHeight(double limit)
 {
-  keepWithin(starts_.row(0).array(), along_[0], limit);
+  keepWithin(starts_.row(0).array(), along_[0], static_cast<float>(limit));
 }
 
 void
 Lines::keepSlopes(const Eigen::Vector2d& centre, const Row& limits)
 {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  const double a = along_.segment<2>(1).squaredNorm();
-  for (int n = 0; n < kLines; ++n) {
-    // |start + w along - centre|^2 = limit^2.
-    const Eigen::Vector2d start = starts_.col(n).segment<2>(1) - centre;
-    const double b = start.dot(along_.segment<2>(1));
-    const double c = start.squaredNorm() - limits[n] * limits[n];
-    const double discriminant = b * b - a * c;
-    if (a < std::numeric_limits<double>::min() ? c > 0.0 : discriminant < 0.0)
-      low_[n] = kInfinity;
-    else if (a >= std::numeric_limits<double>::min()) {
-      const double root = std::sqrt(discriminant);
-      low_[n] = std::max(low_[n], (-b - root) / a);
-      high_[n] = std::min(high_[n], (-b + root) / a);
-    }
+  // |start + w along - centre|^2 <= limit^2, with all divided by |along|.
+  const Eigen::Vector2f slope = along_.segment<2>(1), from = centre.cast<float>();
+  const float length = slope.norm();
+  const Row x = starts_.row(1).array() - from.x(),
+            y = starts_.row(2).array() - from.y();
+  if (length < std::numeric_limits<float>::min()) {
+    low_ = (x.square() + y.square() > limits.square()).select(kInfinity, low_);
+    return;
   }
+  const Eigen::Vector2f u = slope / length;
+  const Row foot = u.x() * x + u.y() * y, across = u.x() * y - u.y() * x;
+  const Row squared = limits.square() - across.square();
+  const Row half = squared.max(0.0F).sqrt() / length;
+  low_ = (squared < 0.0F).select(kInfinity, low_.max(-foot / length - half));
+  high_ = high_.min(-foot / length + half);
 }
 
 void
 Lines::keepSlope(const Eigen::Vector2d& centre, double limit)
 {
-  keepSlopes(centre, Row::Constant(limit));
+  keepSlopes(centre, Row::Constant(static_cast<float>(limit)));
 }
 
 void
 Lines::keepFriction(const Friction& friction)
 {
   const LogFriction mu(friction);
-  const Row limits = (mu.mean + mu.sigma * allNodes().row(kField).array()).exp();
+  const Row limits =
+      (static_cast<float>(mu.mean) + static_cast<float>(mu.sigma) * allNodes().friction)
+          .exp();
   keepSlopes(Eigen::Vector2d::Zero(), limits);
 }
 

@@ -104,8 +104,8 @@ middleInPlane(const SupportGrid& support)
 }
 
 Foothold
-tried(const PatchMap& map,
-      const MapPatch& patch,
+tried(const MapPatch& patch,
+      const ContactSurface& surface,
       const contact::Sole& sole,
       const FootholdOptions& options)
 {
@@ -114,11 +114,10 @@ tried(const PatchMap& map,
   foothold.views = patch.epochs;
   foothold.last_seen = patch.last_seen;
   foothold.placement.load_direction = options.load_direction;
-  const auto middle = middleOfSupport(patch);
+  const auto middle = middleOfSupport(surface);
   if (!middle)
     return foothold;
   foothold.placement.point = *middle;
-  const ContactSurface surface = contactSurfaceOf(map, patch);
   foothold.risk = contact::atBestYaw(surface, sole, foothold.placement, options.yaws);
   return foothold;
 }
@@ -164,14 +163,13 @@ validityError(const FootholdOptions& options)
 }
 
 std::optional<Eigen::Vector3d>
-middleOfSupport(const MapPatch& patch)
+middleOfSupport(const ContactSurface& surface)
 {
-  const auto middle = middleInPlane(patch.support);
+  const auto middle = middleInPlane(surface.support);
   if (!middle)
     return std::nullopt;
-  const Eigen::Vector2d p = patch.radius_m * *middle;
-  const double height = jetBasis(p.x(), p.y()).dot(patch.jet.value());
-  return patch.anchor.toWorld({p.x(), p.y(), height});
+  const Eigen::Vector2d p = surface.radius_m * *middle;
+  return surface.anchor.toWorld({p.x(), p.y(), surface.jet.height(p.x(), p.y())});
 }
 
 FootholdRanking
@@ -180,13 +178,15 @@ rankFootholds(const PatchMap& map, const Foot& foot, const FootholdOptions& opti
   requireValid(validityError(foot));
   requireValid(validityError(options));
   const contact::Sole sole(foot);
+  const SurfacePrior prior = surfacePriorOf(map, options.load_direction);
   const std::vector<MapPatch>& patches = map.patches();
   FootholdRanking ranking;
   ranking.candidates = static_cast<int>(patches.size());
   ranking.tried.resize(patches.size());
   parallelFor(ranking.candidates, options.threads, [&](int item, int) {
     const auto i = static_cast<std::size_t>(item);
-    ranking.tried[i] = tried(map, patches[i], sole, options);
+    const ContactSurface surface = contactSurfaceOf(map, patches[i], prior);
+    ranking.tried[i] = tried(patches[i], surface, sole, options);
   });
 
   std::vector<const Foothold*> possible;

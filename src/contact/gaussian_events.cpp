@@ -186,22 +186,31 @@ slipProbability(const Eigen::Vector2d& mean,
 }
 
 double
-tailMean(double mean, double sigma, double share)
+tailMean(const std::vector<GaussianShare>& x, double part)
 {
-  const double m = std::abs(mean);
-  if (sigma <= 0.0)
-    return m;
-  // The quantile q of |x|, by bisection: P(|x| > q) = share.
-  double low = 0.0, high = m + 40.0 * sigma;
+  // The quantile q of |x|, by bisection: P(|x| > q) = part.
+  double low = 0.0, high = 0.0;
+  for (const GaussianShare& g : x)
+    high = std::max(high, std::abs(g.mean) + 40.0 * g.sigma);
   for (int i = 0; i < 50; ++i) {
     const double q = 0.5 * (low + high);
-    (outsideProbability(m, sigma, q) > share ? low : high) = q;
+    double beyond = 0.0;
+    for (const GaussianShare& g : x)
+      beyond += g.share * outsideProbability(g.mean, g.sigma, q);
+    (beyond > part ? low : high) = q;
   }
+  // q and what |x| is beyond it: (|x| - q)+ in the mean, over the part.
   const double q = 0.5 * (low + high);
-  const double above = (q - m) / sigma, below = (q + m) / sigma;
-  return (m * (normalCdf(-above) - normalCdf(-below)) +
-          sigma * (normalDensity(above) + normalDensity(below))) /
-         share;
+  double excess = 0.0;
+  for (const GaussianShare& g : x) {
+    const double m = std::abs(g.mean), s = std::max(g.sigma, kKnown * q);
+    if (s <= 0.0)
+      continue;
+    const double above = (q - m) / s, below = (q + m) / s;
+    excess += g.share * ((m - q) * normalCdf(-above) + s * normalDensity(above) -
+                         (m + q) * normalCdf(-below) + s * normalDensity(below));
+  }
+  return q + excess / part;
 }
 
 } // namespace holdfast::contact

@@ -5,6 +5,8 @@
 
 #include <Eigen/Core>
 
+#include <vector>
+
 namespace holdfast::contact {
 
 /// Phi(x), to 1e-7; from a table, since a foothold takes a thousand of them.
@@ -32,7 +34,12 @@ double slipProbability(const Eigen::Vector2d& mean,
                        const Eigen::Matrix2d& covariance,
                        const Friction& friction);
 
-/// Mean of the worst `share` of |x|, x ~ N(mean, sigma^2).
-double tailMean(double mean, double sigma, double share);
+/// One of several Gaussians, and how likely it is that one.
+struct GaussianShare {
+  double share, mean, sigma;
+};
+
+/// Mean of the worst part of |x|, of which that is the probability.
+double tailMean(const std::vector<GaussianShare>& x, double part);
 
 } // namespace holdfast::contact

@@ -29,7 +29,7 @@ requireValid(const std::string& error)
 
 /// A patch as the load meets it: over the grid's plane, about its anchor.
 struct SeenFromAbove {
-  const MapPatch* patch = nullptr;
+  const ContactSurface* patch = nullptr;
   Pose load; ///< frame of the load at the middle of its support
   Pose to_anchor; ///< from that frame
   JetVector jet = JetVector::Zero(); ///< in that frame
@@ -37,7 +37,7 @@ struct SeenFromAbove {
 };
 
 std::optional<SeenFromAbove>
-seenFromAbove(const MapPatch& patch, const Eigen::Matrix3d& axes)
+seenFromAbove(const ContactSurface& patch, const Eigen::Matrix3d& axes)
 {
   const auto middle = middleOfSupport(patch);
   if (!middle)
@@ -46,7 +46,7 @@ seenFromAbove(const MapPatch& patch, const Eigen::Matrix3d& axes)
   seen.patch = &patch;
   seen.load = {axes, *middle};
   const Pose from_anchor = patch.anchor.inverse() * seen.load;
-  const auto moved = movedJet(patch.jet.value(), from_anchor);
+  const auto moved = movedJet(patch.jet.value, from_anchor);
   if (!moved || !moved->value.allFinite())
     return std::nullopt;
   seen.to_anchor = from_anchor;
@@ -78,7 +78,7 @@ sightingAt(const SeenFromAbove& seen, const Eigen::Vector2d& place)
 /// The patch of a cell: the highest, and of those that lie with it the nearest.
 class CellChoice {
 public:
-  void offer(const MapPatch* patch, const Sighting& sighting)
+  void offer(const ContactSurface* patch, const Sighting& sighting)
   {
     if (patch_ == nullptr || isBetter(*patch, sighting)) {
       patch_ = patch;
@@ -86,7 +86,7 @@ public:
     }
   }
 
-  const MapPatch* patch() const
+  const ContactSurface* patch() const
   {
     return patch_;
   }
@@ -96,7 +96,7 @@ public:
   }
 
 private:
-  bool isBetter(const MapPatch& patch, const Sighting& sighting) const
+  bool isBetter(const ContactSurface& patch, const Sighting& sighting) const
   {
     // Two patches of one surface differ by much less than that, two storeys by more.
     const double same = 0.25 * std::min(patch.radius_m, patch_->radius_m);
@@ -104,7 +104,7 @@ private:
     return std::abs(higher) > same ? higher > 0.0 : sighting.distance < best_.distance;
   }
 
-  const MapPatch* patch_ = nullptr;
+  const ContactSurface* patch_ = nullptr;
   Sighting best_;
 };
 
@@ -120,7 +120,7 @@ boundsOf(const std::vector<SeenFromAbove>& patches)
           const double radius = seen.patch->radius_m;
           const Eigen::Vector2d p(radius * SupportGrid::middle(column),
                                   radius * SupportGrid::middle(row));
-          const double height = jetBasis(p.x(), p.y()).dot(seen.patch->jet.value());
+          const double height = jetBasis(p.x(), p.y()).dot(seen.patch->jet.value);
           const Eigen::Vector3d at = seen.load.R.transpose() *
                                      seen.patch->anchor.toWorld({p.x(), p.y(), height});
           bounds.low = bounds.low.cwiseMin(at.head<2>());
@@ -238,15 +238,13 @@ setRisk(const ContactRisk& risk, double yaw, Cell& cell)
 
 /// What a cell of the grid says, over the surface its patch has there.
 Cell
-cellAt(const PatchMap& map,
-       const MapPatch& patch,
+cellAt(const ContactSurface& surface,
        const Eigen::Vector3d& in_grid,
        const contact::Sole& sole,
        const RiskGridOptions& options)
 {
   Cell cell;
   cell.fill(kNaN);
-  const ContactSurface surface = contactSurfaceOf(map, patch);
   Placement placement;
   placement.load_direction = options.load_direction;
   Pose load = loadFrame(placement);
@@ -306,9 +304,13 @@ riskGrid(const PatchMap& map, const Foot& foot, const RiskGridOptions& options)
   Placement level;
   level.load_direction = options.load_direction;
   const Eigen::Matrix3d axes = loadFrame(level).R;
-  std::vector<SeenFromAbove> patches;
+  const SurfacePrior prior = surfacePriorOf(map, options.load_direction);
+  std::vector<ContactSurface> surfaces;
   for (const MapPatch& patch : map.patches())
-    if (const auto seen = seenFromAbove(patch, axes))
+    surfaces.push_back(contactSurfaceOf(map, patch, prior));
+  std::vector<SeenFromAbove> patches;
+  for (const ContactSurface& surface : surfaces)
+    if (const auto seen = seenFromAbove(surface, axes))
       patches.push_back(*seen);
   RiskGrid grid =
       emptyGrid(options.bounds.value_or(boundsOf(patches)), axes, options.resolution_m);
@@ -321,7 +323,7 @@ riskGrid(const PatchMap& map, const Foot& foot, const RiskGridOptions& options)
         continue;
       Eigen::Vector3d in_grid;
       in_grid << grid.position(row, column), choice.elevation();
-      const Cell cell = cellAt(map, *choice.patch(), in_grid, sole, options);
+      const Cell cell = cellAt(*choice.patch(), in_grid, sole, options);
       for (std::size_t layer = 0; layer < kLayers; ++layer)
         grid.data[layer][index] = cell[layer];
     }

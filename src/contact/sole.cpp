@@ -49,6 +49,43 @@ isInside(const std::vector<Vector2d>& corners, const Vector2d& p)
   return inside;
 }
 
+/// Calls f(place, area) at places which integrate polynomials of fifth degree over a
+/// triangle at the origin exactly (Radon 1948), with its orientation as the sign.
+template <typename Function>
+void
+overTriangle(const Vector2d& a, const Vector2d& b, const Function& f)
+{
+  const double area = 0.5 * (a.x() * b.y() - a.y() * b.x());
+  f((a + b) / 3.0, area * 9.0 / 40.0);
+  for (const double root : {-std::sqrt(15.0), std::sqrt(15.0)}) {
+    const double t = (6.0 + root) / 21.0, weight = area * (155.0 + root) / 1200.0;
+    f(t * a + t * b, weight);
+    f(t * a + (1.0 - 2.0 * t) * b, weight);
+    f((1.0 - 2.0 * t) * a + t * b, weight);
+  }
+}
+
+/// Coefficients 1, x, y of the plane that is nearest to each term of a shape over the
+/// sole, in the mean of squares.
+Eigen::Matrix<double, 3, kShape>
+bestPlanes(const Foot& foot, Vector2d& centroid)
+{
+  Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
+  Eigen::Matrix<double, 3, kShape> X = Eigen::Matrix<double, 3, kShape>::Zero();
+  const double scale = soleReach(foot); // so that the plane's terms are alike
+  const auto add = [&](const Vector2d& p, double area) {
+    const Eigen::Vector3d b(1.0, p.x() / scale, p.y() / scale);
+    M += area * b * b.transpose();
+    X += area * b * shapeBasis(p);
+  };
+  for (std::size_t i = 0; i < foot.sole.size(); ++i)
+    overTriangle(foot.sole[i], foot.sole[(i + 1) % foot.sole.size()], add);
+  centroid = scale * M.col(0).tail<2>() / M(0, 0);
+  Eigen::Matrix<double, 3, kShape> planes = M.ldlt().solve(X);
+  planes.bottomRows<2>() /= scale;
+  return planes;
+}
+
 /// Middles of equal cells within the sole: some fifty, so that a share of it is told to
 /// 2 %, and the residual of a quadric in between is known.
 Matrix2Xd
@@ -70,14 +107,13 @@ cellsOf(const Foot& foot)
         if (isInside(foot.sole, p))
           inside.push_back(p);
       }
-    // Three cells off a line tell a plane; half of those asked for are enough of them.
     if (static_cast<int>(inside.size()) >= kCells / 2)
       return columns(inside);
   }
 }
 
 Matrix2Xd
-extremesOf(const Foot& foot, const Matrix2Xd& cells)
+extremesOf(const Foot& foot, const Vector2d& centroid)
 {
   std::vector<Vector2d> points;
   for (std::size_t i = 0; i < foot.sole.size(); ++i) {
@@ -85,7 +121,7 @@ extremesOf(const Foot& foot, const Matrix2Xd& cells)
     points.push_back(foot.sole[i]);
     points.emplace_back(0.5 * (foot.sole[i] + next));
   }
-  points.emplace_back(cells.rowwise().mean());
+  points.push_back(centroid);
   return columns(points);
 }
 
@@ -117,19 +153,10 @@ Sole::Sole(const Foot& foot) : foot_(foot)
   if (const std::string error = validityError(foot); !error.empty())
     throw std::invalid_argument(error);
   area_ = soleArea(foot);
-  const Matrix2Xd cells = cellsOf(foot);
-  Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
-  Eigen::Matrix<double, 3, kShape> X = Eigen::Matrix<double, 3, kShape>::Zero();
-  const double scale = soleReach(foot); // the plane's terms in like units
-  for (const Vector2d p : cells.colwise()) {
-    const Eigen::Vector3d b(1.0, p.x() / scale, p.y() / scale);
-    M += b * b.transpose();
-    X += b * shapeBasis(p);
-  }
-  planes_ = M.ldlt().solve(X);
-  planes_.bottomRows<2>() /= scale;
-  cells_ = placesAt(cells);
-  extremes_ = placesAt(extremesOf(foot, cells));
+  Vector2d centroid;
+  planes_ = bestPlanes(foot, centroid);
+  cells_ = placesAt(cellsOf(foot));
+  extremes_ = placesAt(extremesOf(foot, centroid));
   even_extremes_ = placesAt(withoutRepeated(extremes_));
 }
 

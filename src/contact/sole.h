@@ -64,8 +64,7 @@ private:
 
   Foot foot_;
   double area_ = 0.0;
-  /// Coefficients 1, x, y of the plane that fits each term of a shape best.
-  Eigen::Matrix<double, 3, kShape> planes_;
+  Eigen::Matrix<double, 3, kShape> planes_; ///< nearest to each term of a shape
   SolePlaces cells_, extremes_, even_extremes_;
 };
 

@@ -33,19 +33,62 @@ inline constexpr std::array<std::string_view, 6> kRiskAssumptions{
     "have in common",
     "nothing is said of what lies beyond the sole, of the leg, or of balance"};
 
-/// A piece of surface that may be touched.
-struct ContactSurface {
+/// What a surface may be, and how likely it is that.
+struct SurfaceHypothesis {
+  double share = 1.0;
   Jet jet; ///< at the anchor
-  Pose anchor; ///< frame of the map, or of the sensor
-  /// Where it was seen, in the plane of the anchor, in radii of radius_m.
-  SupportGrid support;
-  double radius_m = 0.0; ///< of the disc whose best quadric it is
   /// Root mean square third derivative, 1/m^2; 0: a quadric and nothing else.
   double s3_per_m2 = 0.0;
 };
 
-/// A patch of a map, with its roughness.
-ContactSurface contactSurfaceOf(const PatchMap& map, const MapPatch& patch);
+/// A piece of surface that may be touched.
+struct ContactSurface {
+  Jet jet; ///< at the anchor
+  double s3_per_m2 = 0.0; ///< as SurfaceHypothesis
+  /// Where several kinds of surface are possible, these count, and jet and s3_per_m2
+  /// are what they have as mean and covariance. Empty: those are all.
+  std::vector<SurfaceHypothesis> hypotheses;
+  Pose anchor; ///< frame of the map, or of the sensor
+  /// Where it was seen, in the plane of the anchor, in radii of radius_m.
+  SupportGrid support;
+  double radius_m = 0.0; ///< of the disc whose best quadric it is
+
+  bool isQuadric() const
+  {
+    return hypotheses.empty() && s3_per_m2 == 0.0;
+  }
+};
+
+/// One kind of the surfaces of a scene: slopes, second and third derivatives are
+/// isotropic Gaussian numbers.
+struct SurfaceKind {
+  double share = 1.0; ///< of all surfaces
+  double slope = 0.0; ///< standard deviation of each of gx gy, against the load
+  /// xx xy yy have the covariance curvature_per_m^2 [1 0 1/3; 0 1/3 0; 1/3 0 1].
+  double curvature_per_m = 0.0;
+  double s3_per_m2 = 0.0; ///< SurfaceHypothesis
+};
+
+/// What is known of a scene before a place of it is looked at. Without it a surface may
+/// be anything, and what is measured badly counts as as steep and as bent as its noise
+/// makes it look; with one kind alone, level ground counts as as rough as the edges
+/// beside it.
+struct SurfacePrior {
+  std::vector<SurfaceKind> kinds; ///< the smoothest first; empty: nothing is known
+  double noise_scale = 1.0; ///< of chi-square on what is smooth
+  Eigen::Vector3d load_direction = -Eigen::Vector3d::UnitZ(); ///< frame of the map
+};
+
+/// As the patches of a map tell it: the kinds, from smooth to rough, that make their
+/// slopes, curvatures and misfits likeliest (expectation maximisation, from a fixed
+/// start). Nothing for a map with less than 30 patches that face the load.
+/// \param load_direction frame of the map, of any length but zero.
+SurfacePrior surfacePriorOf(const PatchMap& map, const Eigen::Vector3d& load_direction);
+
+/// A patch of a map, with its roughness, and what is known of all surfaces there.
+ContactSurface contactSurfaceOf(const PatchMap& map,
+                                const MapPatch& patch,
+                                const SurfacePrior& prior);
 
 /// A single patch: seen wherever its boundary is.
 /// \return nothing where the fit is not usable.

@@ -23,9 +23,9 @@ struct FootholdOptions {
 /// Empty when the options make sense, else one sentence.
 std::string validityError(const FootholdOptions& options);
 
-/// The middle of where a patch was seen, on the surface that is expected there, frame
-/// of the map; nothing where it was seen nowhere.
-std::optional<Eigen::Vector3d> middleOfSupport(const MapPatch& patch);
+/// The middle of where a surface was seen, on the surface that is expected there, in
+/// its frame; nothing where it was seen nowhere.
+std::optional<Eigen::Vector3d> middleOfSupport(const ContactSurface& surface);
 
 struct Foothold {
   std::uint64_t patch = 0; ///< id in the map

@@ -1,0 +1,190 @@
+#include "report/report_result.h"
+
+#include "io/json_split.h"
+
+#include <holdfast/io/names.h>
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <filesystem>
+#include <stdexcept>
+#include <string_view>
+
+namespace holdfast::app {
+namespace {
+
+using Json = nlohmann::json;
+
+/// One text for each object: a file of lines is one whose first line is an object.
+std::vector<std::string>
+objectsOf(const std::string& text)
+{
+  std::size_t end = text.find('\n');
+  const std::string_view first = std::string_view(text).substr(0, end);
+  const std::size_t last = first.find_last_not_of(" \t\r");
+  if (last == std::string_view::npos || last == 0 || first[last] != '}')
+    return {text};
+  std::vector<std::string> objects;
+  for (std::size_t begin = 0; begin < text.size(); begin = end + 1) {
+    end = std::min(text.find('\n', begin), text.size());
+    std::string line = text.substr(begin, end - begin);
+    if (line.find_first_not_of(" \t\r") != std::string::npos)
+      objects.push_back(std::move(line));
+  }
+  return objects;
+}
+
+/// The numbers of a patch that tell something a table can show.
+Json
+extrasOf(const Json& patch)
+{
+  Json extras = Json::object();
+  const auto take = [&](const Json& from, const char* name) {
+    if (const auto at = from.find(name); at != from.end() && at->is_number())
+      extras[name] = *at;
+  };
+  take(patch, "risk");
+  if (const auto map = patch.find("map"); map != patch.end() && map->is_object())
+    for (const char* name :
+         {"id", "views", "independent_views", "last_seen", "conflicts", "roughness"})
+      take(*map, name);
+  return extras;
+}
+
+/// parseResult() has already understood the text.
+void
+readRest(const std::string& text, ReportResult& result)
+{
+  if (const auto split = io::splitJsonArray(text, "patches")) {
+    result.head = Json::parse(split->rest);
+    for (const std::string_view patch : split->elements)
+      result.extras.push_back(extrasOf(Json::parse(patch)));
+  }
+  else {
+    result.head = Json::parse(text);
+    for (const Json& patch : result.head.at("patches"))
+      result.extras.push_back(extrasOf(patch));
+  }
+  result.head.erase("patches");
+}
+
+Eigen::Vector3d
+vectorFrom(const Json& json)
+{
+  return {json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>()};
+}
+
+/// Of the result's sensor, in the frame of the points.
+std::optional<Pose>
+sensorPoseOf(const ReportResult& result)
+{
+  const Json sensor = result.head.value("sensor", Json::object());
+  if (!sensor.contains("position") || !sensor.contains("orientation_wxyz"))
+    return std::nullopt;
+  const Json& q = sensor.at("orientation_wxyz");
+  const Eigen::Quaterniond turn(q.at(0).get<double>(),
+                                q.at(1).get<double>(),
+                                q.at(2).get<double>(),
+                                q.at(3).get<double>());
+  return Pose{turn.normalized().toRotationMatrix(),
+              vectorFrom(sensor.at("position")) - result.report.offset};
+}
+
+/// How the cloud was read when it was fitted, unless the caller says otherwise.
+LoadOptions
+loadOptionsOf(const ReportResult& result,
+              const InputOptions& input,
+              const Sensor& sensor)
+{
+  LoadOptions options = loadOptions(input, sensor);
+  const Json file = result.head.value("input", Json::object());
+  if (!input.unit)
+    options.unit_m = file.value("unit_m", options.unit_m);
+  if (!input.axes && file.contains("axes"))
+    options.axes = kCloudAxesNames.find(file.at("axes").get<std::string>());
+  return options;
+}
+
+} // namespace
+
+std::vector<ReportResult>
+readReportResults(const std::string& path)
+{
+  std::vector<ReportResult> results;
+  for (const std::string& text : objectsOf(readResultText(path))) {
+    ReportResult result;
+    result.source = path;
+    result.report = parseResult(path, text);
+    try {
+      readRest(text, result);
+      sensorPoseOf(result);
+    }
+    catch (const Json::exception& error) {
+      throw std::runtime_error(path + ": no result of holdfast: " + error.what());
+    }
+    results.push_back(std::move(result));
+  }
+  return results;
+}
+
+void
+addCloud(ReportResult& result,
+         const std::string& cloud,
+         const InputOptions& input,
+         std::vector<std::string>& notices)
+{
+  const bool has_own = !result.report.is_of_map && result.head.contains("input");
+  std::optional<std::string> path;
+  if (!cloud.empty())
+    path = cloud;
+  else if (has_own)
+    path = findCloud(result.source, result.report.cloud);
+  if (!path) {
+    if (has_own)
+      result.cloud_note = "The cloud " + result.report.cloud +
+                          " was neither in the working folder nor beside the result: "
+                          "--cloud FILE tells where it is.";
+    else
+      result.cloud_note = "The result names no file of points: --cloud FILE adds one.";
+    return;
+  }
+  const Sensor sensor = loadSensorOption(input.sensor_name);
+  std::vector<std::string> about;
+  result.cloud =
+      loadSeenCloud(*path, loadOptionsOf(result, input, sensor), sensor, about);
+  // The caller of the fit may have said where the sensor stood.
+  if (const auto pose = sensorPoseOf(result))
+    result.cloud = seenFrom(*pose, std::move(result.cloud->points));
+  result.cloud_file = *path;
+  for (const std::string& notice : about)
+    notices.push_back(*path + ": " + notice);
+}
+
+SeenCloud
+seenOf(const ReportResult& result)
+{
+  if (result.cloud)
+    return *result.cloud;
+  PicturePoints middles;
+  for (const ExtractedPatch& patch : result.report.result.patches)
+    if (hasShape(patch))
+      middles.positions.push_back(patch.fit.patch.c);
+  return seenFrom(sensorPoseOf(result).value_or(Pose()), std::move(middles));
+}
+
+bool
+hasShape(const ExtractedPatch& patch)
+{
+  return isUsable(patch.fit.status) && validityError(patch.fit.patch).empty();
+}
+
+std::string
+titleOf(const ReportResult& result)
+{
+  const std::string name =
+      std::filesystem::path(result.report.cloud).filename().string();
+  return name.empty() ? result.report.cloud : name;
+}
+
+} // namespace holdfast::app
