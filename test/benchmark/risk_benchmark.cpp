@@ -48,11 +48,9 @@ riskOfYaw(benchmark::State& state)
   std::size_t next = 0, evaluated = 0;
   for ([[maybe_unused]] auto _ : state) {
     const MapPatch& patch = map.patches()[next++ % map.patches().size()];
-    placement.point = *middleOfSupport(patch);
-    const auto risks = contactRisks(contactSurfaceOf(map, patch, prior),
-                                    smallFoot(),
-                                    placement,
-                                    kYaws);
+    const ContactSurface surface = contactSurfaceOf(map, patch, prior);
+    placement.point = *middleOfSupport(surface);
+    const auto risks = contactRisks(surface, smallFoot(), placement, kYaws);
     evaluated += risks.size();
     benchmark::DoNotOptimize(risks);
   }
