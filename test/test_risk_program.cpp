@@ -325,6 +325,8 @@ TEST_F(RiskProgram, NamesWhatIsWrongWithTheRest)
   expectError({path("result.json"), "--foot", "point_foot"}, "is a result");
   expectError({kRocks, "--foot", "humanoid_foot", "--radius", "0.03", "--quiet"},
               "the sole reaches 0.112 m");
+  expectError({kRocks, "--foot", "point_foot", "--radius", "0.004", "--quiet"},
+              "no patch of a radius of 0.004 m fits this cloud");
   for (const std::vector<std::string>& usage : std::vector<std::vector<std::string>>{
            {kRocks},
            {kRocks, "--foot", "point_foot", "--yaws", "0"},

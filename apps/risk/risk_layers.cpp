@@ -114,7 +114,8 @@ tiffPage(const RiskGrid& grid, int layer, std::uint32_t start, bool is_last)
     }
   const auto size = static_cast<std::uint32_t>(page.size());
   std::string name = grid.layers[static_cast<std::size_t>(layer)];
-  name.resize((name.size() + 4) / 4 * 4, '\0'); // an end, and whole words
+  const auto letters = static_cast<std::uint32_t>(name.size()) + 1; // with an end
+  name.resize((name.size() + 4) / 4 * 4, '\0'); // whole words
   const auto width = static_cast<std::uint32_t>(grid.columns);
   const auto height = static_cast<std::uint32_t>(grid.rows);
   const std::vector<std::array<std::uint32_t, 4>> entries{
@@ -124,7 +125,7 @@ tiffPage(const RiskGrid& grid, int layer, std::uint32_t start, bool is_last)
       {258, Short, 1, 32}, // bits
       {259, Short, 1, 1}, // not compressed
       {262, Short, 1, 1}, // black is zero
-      {270, Ascii, static_cast<std::uint32_t>(name.size()), start + size},
+      {270, Ascii, letters, start + size},
       {273, Long, 1, start}, // of its only strip
       {277, Short, 1, 1}, // samples
       {278, Long, 1, height},

@@ -20,7 +20,7 @@ vectorJson(const Vector& v)
 {
   Json numbers = Json::array();
   for (Eigen::Index i = 0; i < v.size(); ++i)
-    numbers.push_back(v[i]);
+    numbers.push_back(v[i] + 0.0); // -0 becomes 0
   return numbers;
 }
 

@@ -64,8 +64,8 @@ addRankingOptions(CLI::App& command, RiskSettings& settings)
       .add_option("--spacing",
                   settings.footholds.spacing_m,
                   "Least distance between two footholds, metres; 0: every patch")
-      ->check(CLI::NonNegativeNumber)
-      ->type_name("M")
+      ->check(CLI::Validator(CLI::NonNegativeNumber).description("M"))
+      ->type_name("")
       ->capture_default_str()
       ->group(group);
   command

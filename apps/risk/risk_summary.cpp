@@ -72,8 +72,13 @@ causeOfNone(const RiskReport& report)
   const FootholdRanking& r = report.ranking;
   if (!r.footholds.empty())
     return "";
-  if (r.candidates == 0)
+  if (r.candidates == 0 && report.ground.is_map_file)
     return "there is no patch to step on";
+  if (r.candidates == 0)
+    return fmt::format("no patch of a radius of {:.3f} m fits this cloud; --radius "
+                       "takes others, where the sole reaches {:.3f} m",
+                       report.ground.radius_m,
+                       soleReach(report.foot));
   if (r.unseen == r.candidates)
     return "the map tells of none of its patches where it was seen (no support grids), "
            "and without that there is no risk";

@@ -44,12 +44,13 @@ riskOfYaw(benchmark::State& state)
   const PatchMap& map = frameMap();
   Placement placement;
   placement.load_direction = Eigen::Vector3d::UnitZ();
+  const SurfacePrior prior = surfacePriorOf(map, placement.load_direction);
   std::size_t next = 0, evaluated = 0;
   for ([[maybe_unused]] auto _ : state) {
     const MapPatch& patch = map.patches()[next++ % map.patches().size()];
-    placement.point = *middleOfSupport(patch);
-    const auto risks =
-        contactRisks(contactSurfaceOf(map, patch), smallFoot(), placement, kYaws);
+    const ContactSurface surface = contactSurfaceOf(map, patch, prior);
+    placement.point = *middleOfSupport(surface);
+    const auto risks = contactRisks(surface, smallFoot(), placement, kYaws);
     evaluated += risks.size();
     benchmark::DoNotOptimize(risks);
   }
