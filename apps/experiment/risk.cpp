@@ -332,9 +332,9 @@ describe(const RiskChoice& choice, Report& report)
           "the sum over events.",
           choice.step_m * (choice.frames - 1),
           100.0 * choice.radius_m),
-      "Best of 20: of 20 random places for one foot the one with the least total risk. "
-      "What was chosen for its small risk looks better than it is; a view that had no "
-      "part in the choice does not flatter it."};
+      "Best of 20: of 20 random places for one foot the one with the least total risk, "
+      "as it was chosen, and as another view, which had no part in the choice, judges "
+      "it."};
 }
 
 Report
