@@ -4,8 +4,8 @@
 #include "map_stills.h"
 #include "map_walk.h"
 #include "spots.h"
+#include "walk_options.h"
 
-#include <holdfast/simulation/scene.h>
 
 #include <CLI/CLI.hpp>
 #include <boost/math/distributions/chi_squared.hpp>
@@ -20,12 +20,8 @@ namespace holdfast::app {
 namespace {
 
 struct MapChoice {
-  std::vector<std::string> scenes{"boulder_field", "stairway"};
-  int frames = 101;
-  double step_m = 0.1;
-  int stride = 2;
+  WalkChoice walk{{"boulder_field", "stairway"}, 101};
   double odometry_mrad = 1.0, odometry_mm = 2.0;
-  std::string sensor = "xtion";
   std::string recorded; ///< folder; empty: walks
 };
 
@@ -357,9 +353,9 @@ describe(const MapChoice& choice, Report& report)
           "known, of odometry with {} mrad and {} mm a frame and axis, or found "
           "by registration to the map alone; noise is independent or, with the "
           "pattern, shared by pixels and the same in all frames.",
-          choice.step_m * (choice.frames - 1),
-          choice.frames,
-          choice.stride,
+          choice.walk.step_m * (choice.walk.frames - 1),
+          choice.walk.frames,
+          choice.walk.stride,
           choice.odometry_mrad,
           choice.odometry_mm),
       "Each patch of the last map, as it was when it was last seen, against the best "
@@ -388,8 +384,8 @@ addPlot(const MapChoice& choice,
         Report& report)
 {
   report.plot.columns = 3;
-  for (std::size_t i = 0; i < choice.scenes.size(); ++i) {
-    const std::string& scene = choice.scenes[i];
+  for (std::size_t i = 0; i < choice.walk.scenes.size(); ++i) {
+    const std::string& scene = choice.walk.scenes[i];
     Panel drift;
     drift.title = scene;
     drift.x.label = "way (m)";
@@ -426,7 +422,7 @@ runStills(const MapChoice& choice, const ExperimentSettings& settings)
       "independent: without it. What the whole plane is bent counts as an error here."};
   RecordingOptions recordings;
   recordings.folder = choice.recorded;
-  recordings.sensor_name = choice.sensor;
+  recordings.sensor_name = choice.walk.sensor;
   const auto outcomes =
       mapStills(recordings, all_rules, settings.threads, settings.seed, report.remarks);
   for (std::size_t rule = 0; rule < all_rules.size(); ++rule)
@@ -441,17 +437,17 @@ runMap(const MapChoice& choice, const ExperimentSettings& settings)
 {
   Report report;
   std::vector<std::vector<WalkOutcome>> first_walks;
-  const int stages = static_cast<int>(choice.scenes.size()) * settings.trials;
+  const int stages = static_cast<int>(choice.walk.scenes.size()) * settings.trials;
   int stage = 0;
-  for (const std::string& scene : choice.scenes) {
+  for (const std::string& scene : choice.walk.scenes) {
     std::vector<std::vector<WalkOutcome>> by_rule(rules().size());
     for (int trial = 0; trial < settings.trials; ++trial) {
       WalkSettings walk;
       walk.scene = scene;
-      walk.frames = choice.frames;
-      walk.step_m = choice.step_m;
-      walk.stride = choice.stride;
-      walk.sensor = loadSensorOption(choice.sensor);
+      walk.frames = choice.walk.frames;
+      walk.step_m = choice.walk.step_m;
+      walk.stride = choice.walk.stride;
+      walk.sensor = loadSensorOption(choice.walk.sensor);
       walk.odometry_sigma_rad = 1e-3 * choice.odometry_mrad;
       walk.odometry_sigma_m = 1e-3 * choice.odometry_mm;
       walk.seed = settings.seed + static_cast<std::uint64_t>(trial);
@@ -482,21 +478,7 @@ runMap(const MapChoice& choice, const ExperimentSettings& settings)
 void
 addChoices(CLI::App& command, MapChoice& choice)
 {
-  command.add_option("--scene", choice.scenes, "Scenes to walk through")
-      ->type_name("NAME...")
-      ->check(CLI::IsMember(sceneNames()))
-      ->capture_default_str();
-  command.add_option("--frames", choice.frames, "Frames of a walk")
-      ->check(CLI::Range(2, 100000, "N"))
-      ->type_name("")
-      ->capture_default_str();
-  command.add_option("--step", choice.step_m, "Way between frames, m")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  command.add_option("--stride", choice.stride, "Every so many pixels count")
-      ->check(CLI::Range(1, 16, "N"))
-      ->type_name("")
-      ->capture_default_str();
+  addWalkOptions(command, choice.walk);
   command
       .add_option("--odometry-mrad",
                   choice.odometry_mrad,
@@ -517,7 +499,6 @@ addChoices(CLI::App& command, MapChoice& choice)
           "from one pose, about the table before it")
       ->type_name("FOLDER")
       ->check(CLI::ExistingDirectory);
-  addSensorOption(command, choice.sensor);
 }
 
 } // namespace

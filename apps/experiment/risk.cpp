@@ -3,11 +3,11 @@
 #include "input_options.h"
 #include "risk_cases.h"
 #include "spots.h"
+#include "walk_options.h"
 
 #include <holdfast/evaluation/contact_referee.h>
 #include <holdfast/geometry/gaussian.h>
 #include <holdfast/geometry/rotation.h>
-#include <holdfast/simulation/scene.h>
 #include <holdfast/uncertainty/monte_carlo.h>
 
 #include <CLI/CLI.hpp>
@@ -23,14 +23,10 @@ namespace holdfast::app {
 namespace {
 
 struct RiskChoice {
-  std::vector<std::string> scenes{"boulder_field"};
+  WalkChoice walk{{"boulder_field"}, 40};
   double radius_m = 0.08;
-  int frames = 40;
-  double step_m = 0.1;
-  int stride = 2;
   int draws = 200000;
   int surfaces = 60;
-  std::string sensor = "xtion";
 };
 
 /// A surface, foot and place whose risks are neither none nor certain.
@@ -268,20 +264,20 @@ addChosen(const Group& group, const std::vector<ChosenCase>& chosen, Report& rep
 void
 addWalks(const RiskChoice& choice, const ExperimentSettings& settings, Report& report)
 {
-  const int stages = 2 * static_cast<int>(choice.scenes.size()) * settings.trials;
+  const int stages = 2 * static_cast<int>(choice.walk.scenes.size()) * settings.trials;
   int stage = 0;
-  for (const std::string& scene : choice.scenes)
+  for (const std::string& scene : choice.walk.scenes)
     for (const bool pattern : {false, true}) {
       RiskOutcome all;
       for (int trial = 0; trial < settings.trials; ++trial) {
         RiskWalk walk;
         walk.scene = scene;
         walk.radius_m = choice.radius_m;
-        walk.frames = choice.frames;
-        walk.step_m = choice.step_m;
-        walk.stride = choice.stride;
+        walk.frames = choice.walk.frames;
+        walk.step_m = choice.walk.step_m;
+        walk.stride = choice.walk.stride;
         walk.pattern = pattern;
-        walk.sensor = loadSensorOption(choice.sensor);
+        walk.sensor = loadSensorOption(choice.walk.sensor);
         walk.seed = settings.seed + static_cast<std::uint64_t>(trial);
         walk.threads = settings.threads;
         walk.progress = stageProgress(settings.progress, stage++, stages);
@@ -330,7 +326,7 @@ describe(const RiskChoice& choice, Report& report)
           "joint probability that the foot slips, is off its height or gapes; happened "
           "is how often the true surface under the sole does that; union: the mean of "
           "the sum over events.",
-          choice.step_m * (choice.frames - 1),
+          choice.walk.step_m * (choice.walk.frames - 1),
           100.0 * choice.radius_m),
       "Best of 20: of 20 random places for one foot the one with the least total risk, "
       "as it was chosen, and as another view, which had no part in the choice, judges "
@@ -358,23 +354,9 @@ runRisk(const RiskChoice& choice, const ExperimentSettings& settings)
 void
 addChoices(CLI::App& command, RiskChoice& choice)
 {
-  command.add_option("--scene", choice.scenes, "Scenes to walk through")
-      ->type_name("NAME...")
-      ->check(CLI::IsMember(sceneNames()))
-      ->capture_default_str();
+  addWalkOptions(command, choice.walk);
   command.add_option("--radius", choice.radius_m, "Of the patches, m")
       ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  command.add_option("--frames", choice.frames, "Frames of a walk")
-      ->check(CLI::Range(1, 100000, "N"))
-      ->type_name("")
-      ->capture_default_str();
-  command.add_option("--step", choice.step_m, "Way between frames, m")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  command.add_option("--stride", choice.stride, "Every so many pixels count")
-      ->check(CLI::Range(1, 16, "N"))
-      ->type_name("")
       ->capture_default_str();
   command.add_option("--draws", choice.draws, "Of a surface, for its closed forms")
       ->check(CLI::Range(100, 100000000, "N"))
@@ -384,7 +366,6 @@ addChoices(CLI::App& command, RiskChoice& choice)
       ->check(CLI::Range(1, 1000000, "N"))
       ->type_name("")
       ->capture_default_str();
-  addSensorOption(command, choice.sensor);
 }
 
 } // namespace

@@ -1,6 +1,7 @@
 #include "contact/sole.h"
 
 #include "fusion/third_derivatives.h"
+#include "geometry/polygon.h"
 #include "geometry/symmetric.h"
 
 #include <Eigen/Cholesky>
@@ -33,20 +34,6 @@ columns(const std::vector<Vector2d>& points)
   for (std::size_t i = 0; i < points.size(); ++i)
     matrix.col(static_cast<Eigen::Index>(i)) = points[i];
   return matrix;
-}
-
-/// By the number of edges that a ray along x crosses.
-bool
-isInside(const std::vector<Vector2d>& corners, const Vector2d& p)
-{
-  bool inside = false;
-  for (std::size_t i = 0, j = corners.size() - 1; i < corners.size(); j = i++) {
-    const Vector2d &a = corners[i], &b = corners[j];
-    if ((a.y() > p.y()) != (b.y() > p.y()) &&
-        p.x() < a.x() + (b.x() - a.x()) * (p.y() - a.y()) / (b.y() - a.y()))
-      inside = !inside;
-  }
-  return inside;
 }
 
 /// Calls f(place, area) at places which integrate polynomials of fifth degree over a

@@ -1,5 +1,6 @@
 #include <holdfast/evaluation/contact_referee.h>
 
+#include "geometry/polygon.h"
 #include <holdfast/fusion/roughness.h>
 #include <holdfast/geometry/gaussian.h>
 
@@ -30,20 +31,6 @@ termsAt(const Vector2d& p)
   terms << jetBasis(x, y).transpose(), x * x * x / 6.0, x * x * y / 2.0,
       x * y * y / 2.0, y * y * y / 6.0;
   return terms;
-}
-
-/// By the number of edges that a ray along x crosses.
-bool
-isInside(const std::vector<Vector2d>& corners, const Vector2d& p)
-{
-  bool inside = false;
-  for (std::size_t i = 0, j = corners.size() - 1; i < corners.size(); j = i++) {
-    const Vector2d &a = corners[i], &b = corners[j];
-    if ((a.y() > p.y()) != (b.y() > p.y()) &&
-        p.x() < a.x() + (b.x() - a.x()) * (p.y() - a.y()) / (b.y() - a.y()))
-      inside = !inside;
-  }
-  return inside;
 }
 
 /// Places of a square raster that lie in a sole.
