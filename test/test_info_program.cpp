@@ -188,10 +188,12 @@ TEST(InfoProgram, ABrokenSensorFileOfYourOwnIsSaid)
   saveWall(folder + "/wall.pcd", loadSensor("xtion").camera);
   test::writeFile(freshFolder("info_broken_sensor/own/sensors") + "/bad.yaml",
                   "name: [\n");
-  const auto run = test::runExecutable(
-      folder,
-      "/usr/bin/env",
-      {"HOLDFAST_CONFIG_DIR=" + folder + "/own", HOLDFAST_PROGRAM, "info", "wall.pcd"});
+  const auto run = test::runExecutable(folder,
+                                       "/usr/bin/env",
+                                       {"HOLDFAST_CONFIG_DIR=" + folder + "/own",
+                                        HOLDFAST_PROGRAM,
+                                        "info",
+                                        folder + "/wall.pcd"});
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_NE(run.out.find("like         xtion\n"), std::string::npos) << run.out;
   EXPECT_NE(run.out.find("no sensor to compare with: "), std::string::npos) << run.out;
