@@ -10,7 +10,7 @@ namespace holdfast {
 /// The points that each accepted patch was fitted to, ascending, as indices into the
 /// cloud; empty where a patch is not accepted or has no seed. The neighbourhoods are
 /// searched once more, which takes a small part of the time of the fits.
-/// \param cloud, sensor, options, sites as extractPatches() was given them.
+/// \param cloud,sensor,options,sites as extractPatches() was given them.
 /// \param patches what it returned.
 /// \throw std::invalid_argument as extractPatches().
 std::vector<std::vector<int>> pointsOfPatches(
