@@ -5,6 +5,7 @@
 #include "input_options.h"
 
 #include <holdfast/io/atomic_file.h>
+#include <holdfast/io/config.h>
 #include <holdfast/io/names.h>
 #include <holdfast/pcl/intrinsics.h>
 
@@ -17,6 +18,7 @@
 #include <iostream>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 
 #include <fmt/format.h>
 
@@ -50,6 +52,7 @@ struct CloudFacts {
   Pose sensor_pose; ///< in the frame of the file
   std::optional<Camera> camera; ///< recovered from the points
   double camera_rms_px = 0.0;
+  std::vector<std::string> sensors; ///< known ones with such a camera
   Eigen::Vector3d offset = Eigen::Vector3d::Zero(); ///< of RangeCloud
   bool has_covariances = false;
   int invalid_covariances = 0;
@@ -58,6 +61,45 @@ struct CloudFacts {
   {
     return 1.0 - static_cast<double>(valid) / (static_cast<double>(width) * height);
   }
+};
+
+/// The sensors that come with Holdfast or stand beside them, read when first needed.
+class KnownSensors {
+public:
+  /// Names of those with such a camera; what could not be read goes to `notices`.
+  std::vector<std::string> like(const Camera& camera, std::vector<std::string>& notices)
+  {
+    load();
+    notices.insert(notices.end(), unreadable_.begin(), unreadable_.end());
+    std::vector<std::string> names;
+    for (const Sensor& sensor : sensors_)
+      if (isOfType(camera, sensor.camera))
+        names.push_back(sensor.name);
+    return names;
+  }
+
+private:
+  void load()
+  {
+    if (loaded_)
+      return;
+    loaded_ = true;
+    for (const std::string& name : listSensors())
+      try {
+        const Sensor sensor = loadSensor(name);
+        // One without noise is for simulated truth: nothing was taken by it.
+        if (!sensor.noise->covariance(Eigen::Vector3d::UnitZ()).isZero(0.0))
+          sensors_.push_back(sensor);
+      }
+      catch (const std::runtime_error& error) {
+        unreadable_.push_back("no sensor to compare with: " +
+                              std::string(error.what()));
+      }
+  }
+
+  bool loaded_ = false;
+  std::vector<Sensor> sensors_;
+  std::vector<std::string> unreadable_;
 };
 
 void
@@ -78,7 +120,10 @@ measureExtent(const RangeCloud& cloud, CloudFacts& facts)
 }
 
 CloudFacts
-factsAbout(const std::string& path, const InputOptions& input, const Sensor& sensor)
+factsAbout(const std::string& path,
+           const InputOptions& input,
+           const Sensor& sensor,
+           KnownSensors& known)
 {
   CloudFacts facts;
   facts.path = path;
@@ -97,6 +142,8 @@ factsAbout(const std::string& path, const InputOptions& input, const Sensor& sen
   facts.sensor_pose = cloud.sensor_pose;
   facts.sensor_pose.c += cloud.offset;
   facts.camera = recoverIntrinsics(cloud, &facts.camera_rms_px);
+  if (facts.camera)
+    facts.sensors = known.like(*facts.camera, facts.file.notices);
   facts.has_covariances = cloud.hasCovariances();
   facts.invalid_covariances = countInvalidCovariances(cloud);
   return facts;
@@ -158,6 +205,7 @@ factsJson(const CloudFacts& facts)
       {"viewpoint", facts.file.viewpoint ? poseJson(*facts.file.viewpoint) : Json()},
       {"sensor_pose", poseJson(facts.sensor_pose)},
       {"intrinsics", recoveredJson(facts)},
+      {"sensors", facts.sensors},
       {"covariances", covariances},
       {"notices", facts.file.notices}};
 }
@@ -198,6 +246,15 @@ recoveredText(const CloudFacts& facts)
   return fmt::format("{}, rms {:.2f} px",
                      cameraText(*facts.camera),
                      facts.camera_rms_px);
+}
+
+/// Sensors whose pixels these may be, for --sensor.
+std::string
+sensorsText(const CloudFacts& facts)
+{
+  if (facts.sensors.empty())
+    return facts.camera ? "  like         no sensor known by name\n" : "";
+  return fmt::format("  like         {}\n", fmt::join(facts.sensors, ", "));
 }
 
 std::string
@@ -246,10 +303,11 @@ factsText(const CloudFacts& facts)
                       facts.farthest_m);
   text += appliedText(facts);
   text += fmt::format(
-      "  viewpoint    {}\n  sensor       {}\n  intrinsics   {}\n  covariances  {}\n",
+      "  viewpoint    {}\n  sensor       {}\n  intrinsics   {}\n{}  covariances  {}\n",
       facts.file.viewpoint ? poseText(*facts.file.viewpoint) : "none",
       poseText(facts.sensor_pose),
       recoveredText(facts),
+      sensorsText(facts),
       covarianceText(facts));
   for (const std::string& notice : facts.file.notices)
     text += fmt::format("  note         {}\n", notice);
@@ -264,9 +322,10 @@ runInfo(const InfoSettings& settings)
   if (!settings.json_path.empty() && settings.json_path != "-")
     file.emplace(settings.json_path);
   bool has_json = false;
+  KnownSensors known;
   const int exit_code =
       forEachCloud(settings.input.clouds, [&](const std::string& path) {
-        const CloudFacts facts = factsAbout(path, settings.input, sensor);
+        const CloudFacts facts = factsAbout(path, settings.input, sensor, known);
         if (settings.json_path != "-" && !settings.quiet)
           std::cout << factsText(facts) << std::flush;
         if (settings.json_path.empty())

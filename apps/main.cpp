@@ -1,8 +1,7 @@
 #include "commands.h"
+#include "commit.h"
 #include "console.h"
 #include "endings.h"
-
-#include <holdfast/version.h>
 
 #include <CLI/CLI.hpp>
 
@@ -65,7 +64,7 @@ run(int argc, char** argv)
   CLI::App app("Holdfast: bounded curved contact patches with their covariance, from "
                "depth clouds.");
   app.footer(kExamples);
-  app.set_version_flag("--version", "holdfast " HOLDFAST_VERSION);
+  app.set_version_flag("--version", "holdfast " + holdfast::app::versionWithCommit());
   app.require_subcommand(1);
   int exit_code = 0;
   holdfast::app::addFitCommand(app, exit_code);

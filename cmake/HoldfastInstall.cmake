@@ -16,26 +16,51 @@ if(NOT HOLDFAST_WITH_OPENNI2)
   list(APPEND not_built PATTERN openni2_grabber.h EXCLUDE)
 endif()
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/include/ ${PROJECT_BINARY_DIR}/include/
-  DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} ${not_built})
+  DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dev ${not_built})
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/config
-  DESTINATION ${CMAKE_INSTALL_DATADIR}/holdfast)
-install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/holdfast COMPONENT lib)
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE
+  DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT dev)
+# The pages, and the samples that they speak of; not the tables of long runs.
+install(FILES ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CHANGELOG.md
+  DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT dev)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/samples
+  DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT dev
+  PATTERN experiments EXCLUDE
+  PATTERN quickstart.sh EXCLUDE)
+# Packages want the licence of each under its own name.
+if(PROJECT_IS_TOP_LEVEL)
+  foreach(package lib dev program)
+    string(TOUPPER ${package} upper)
+    install(FILES ${PROJECT_SOURCE_DIR}/LICENSE RENAME copyright
+      DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${CPACK_DEBIAN_${upper}_PACKAGE_NAME}
+      COMPONENT ${package} EXCLUDE_FROM_ALL)
+  endforeach()
+endif()
 if(TARGET holdfast)
-  install(TARGETS holdfast)
+  install(TARGETS holdfast COMPONENT program)
   foreach(module holdfast_viewer holdfast_comparison)
     if(TARGET ${module})
-      install(TARGETS ${module} DESTINATION ${CMAKE_INSTALL_LIBDIR}/holdfast)
+      install(TARGETS ${module}
+        DESTINATION ${CMAKE_INSTALL_LIBDIR}/holdfast COMPONENT program)
     endif()
   endforeach()
 endif()
+include(HoldfastManPages)
 
 # One export set per component: core must be usable where PCL is not installed.
 foreach(component IN LISTS components)
-  install(TARGETS holdfast_${component} EXPORT holdfast_${component}Targets)
+  install(TARGETS holdfast_${component} EXPORT holdfast_${component}Targets
+    RUNTIME COMPONENT lib
+    LIBRARY COMPONENT lib NAMELINK_COMPONENT dev
+    ARCHIVE COMPONENT dev)
   install(EXPORT holdfast_${component}Targets
     NAMESPACE holdfast::
-    DESTINATION ${config_dir})
+    DESTINATION ${config_dir}
+    COMPONENT dev)
 endforeach()
+
+include(HoldfastPkgConfig)
 
 list(JOIN HOLDFAST_PCL_COMPONENTS " " holdfast_pcl_components)
 list(JOIN HOLDFAST_CLOUDS_COMPONENTS " " holdfast_clouds_components)
@@ -50,4 +75,4 @@ write_basic_package_version_file(
 install(FILES
   ${PROJECT_BINARY_DIR}/holdfastConfig.cmake
   ${PROJECT_BINARY_DIR}/holdfastConfigVersion.cmake
-  DESTINATION ${config_dir})
+  DESTINATION ${config_dir} COMPONENT dev)

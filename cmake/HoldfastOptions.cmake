@@ -7,6 +7,10 @@ option(HOLDFAST_BUILD_EXPERIMENTS "The sub-command holdfast experiment"
   ${PROJECT_IS_TOP_LEVEL})
 option(HOLDFAST_QUICKSTART "Only what the first look needs; see HoldfastQuickstart" OFF)
 include(HoldfastQuickstart)
+# Named after PCL's own. Without them, templates for labelled points and points with
+# normals are compiled by who uses them, with PCL_NO_PRECOMPILE.
+option(HOLDFAST_ONLY_CORE_POINT_TYPES
+  "Templates for XYZ, XYZI, XYZRGB, XYZRGBA, Normal and points with covariance only" OFF)
 option(HOLDFAST_WERROR "Treat warnings as errors" OFF)
 set(HOLDFAST_SANITIZE "" CACHE STRING "Sanitizers, e.g. address;undefined or thread")
 

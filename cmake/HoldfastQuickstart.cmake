@@ -16,6 +16,7 @@ set(quickstart_without
   src/sensor/pattern_calibration
   src/uncertainty/stagewise src/uncertainty/second_order
   src/pcl/frame_extraction src/pcl/frame_mapping src/pcl/map_conversions
+  src/pcl/patch_points src/pcl/print
   src/io/patch_map_file src/io/foot_file src/io/atomic_folder src/io/range_frame
   src/io/trajectory_file
   apps/calibrate/ apps/map/ apps/report/ apps/risk/ apps/simulate/ apps/plot.cpp

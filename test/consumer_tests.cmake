@@ -39,5 +39,24 @@ function(add_consumer_test name flags)
   set_tests_properties(${name} PROPERTIES FIXTURES_REQUIRED installed TIMEOUT 600)
 endfunction()
 
+# Without CMake, by what pkg-config says.
+find_program(HOLDFAST_PKG_CONFIG pkg-config)
+mark_as_advanced(HOLDFAST_PKG_CONFIG)
+if(HOLDFAST_PKG_CONFIG AND BUILD_SHARED_LIBS AND NOT HOLDFAST_SANITIZE)
+  set(by_hand ${scratch_dir}/core_consumer_by_hand)
+  set(moved ${prefix}/${CMAKE_INSTALL_LIBDIR})
+  add_test(NAME consumer_pkg_config
+    COMMAND sh -ec "flags=$(PKG_CONFIG_PATH=${moved}/pkgconfig ${HOLDFAST_PKG_CONFIG} --cflags --libs holdfast_core); ${CMAKE_CXX_COMPILER} -std=c++17 ${CMAKE_CURRENT_SOURCE_DIR}/consumer/core_consumer.cpp -o ${by_hand} $flags -Wl,-rpath,${moved}; ${by_hand}")
+  set_tests_properties(consumer_pkg_config PROPERTIES
+    FIXTURES_REQUIRED installed TIMEOUT 600)
+endif()
+
+if(TARGET holdfast_man)
+  add_test(NAME packages
+    COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/support/check_packages.sh
+      ${PROJECT_BINARY_DIR} ${scratch_dir}/debian)
+  set_tests_properties(packages PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 600)
+endif()
+
 add_consumer_test(consumer "")
 add_consumer_test(consumer_native "-march=native")

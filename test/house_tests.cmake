@@ -21,6 +21,11 @@ set(header_dirs ${PROJECT_SOURCE_DIR}/include ${PROJECT_BINARY_DIR}/include)
 # Named once more, the compiler's own folder would come behind those that wrap it.
 set(pcl_dirs ${PCL_INCLUDE_DIRS})
 list(REMOVE_ITEM pcl_dirs /usr/include)
+# The helpers for PCL's viewer need VTK, and are left out where it was not looked for.
+if(TARGET VTK::CommonCore)
+  get_target_property(vtk_dirs VTK::CommonCore INTERFACE_INCLUDE_DIRECTORIES)
+  list(APPEND pcl_dirs ${vtk_dirs})
+endif()
 add_test(NAME headers_compile_alone
   COMMAND ${support}/check_headers.sh ${CMAKE_CXX_COMPILER}
     "${header_dirs};${core_dirs}" "${pcl_dirs}")

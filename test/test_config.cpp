@@ -375,7 +375,17 @@ TEST(BuiltInSensors, AllLoadUnderTheirNames)
 {
   const std::vector<std::string> names = listSensors();
   EXPECT_TRUE(std::is_sorted(names.begin(), names.end()));
-  for (const std::string name : {"kinect_v1", "xtion", "realsense_d435", "perfect"})
+  for (const std::string name : {"kinect_v1",
+                                 "kinect_v2",
+                                 "xtion",
+                                 "realsense_d435",
+                                 "realsense_d455",
+                                 "azure_kinect",
+                                 "zed_2",
+                                 "iphone_lidar",
+                                 "velodyne_vlp16",
+                                 "ouster_os1",
+                                 "perfect"})
     EXPECT_EQ(std::count(names.begin(), names.end(), name), 1) << name;
   for (const std::string& name : names) {
     const Sensor sensor = loadSensor(name);
@@ -404,6 +414,30 @@ TEST(BuiltInSensors, CarryThePublishedNumbers)
   EXPECT_NEAR(std::sqrt(d435.noise->covariance({0, 0, 2})(2, 2)),
               4.0 * 0.08 / (446.8 * 0.05),
               1e-15);
+}
+
+/// Standard deviation of the depth of a surface that faces the sensor, m.
+double
+sigmaAt(const std::string& sensor, double depth_m)
+{
+  return std::sqrt(loadSensor(sensor).noise->covariance({0, 0, depth_m})(2, 2));
+}
+
+TEST(BuiltInSensors, HaveTheNoiseThatTheirSourcesState)
+{
+  EXPECT_NEAR(sigmaAt("realsense_d455", 4.0), 16.0 * 0.08 / (446.8 * 0.095), 1e-15);
+  // 1 % at 3 m and 5 % at 15 m, from a sigma of three digits.
+  EXPECT_NEAR(sigmaAt("zed_2", 3.0), 0.03, 1e-4);
+  EXPECT_NEAR(sigmaAt("zed_2", 15.0), 0.75, 2e-3);
+  // 1.5 - 0.5 z + 0.3 z^2 mm, from numbers of four digits.
+  for (const double z : {0.5, 1.0, 2.0, 4.0})
+    EXPECT_NEAR(sigmaAt("kinect_v2", z), 1e-3 * (1.5 - 0.5 * z + 0.3 * z * z), 2e-7);
+  EXPECT_NEAR(sigmaAt("azure_kinect", 3.86), 0.017, 2e-5);
+  EXPECT_NEAR(sigmaAt("iphone_lidar", 2.0), 0.01, 1e-15);
+  EXPECT_NEAR(sigmaAt("velodyne_vlp16", 20.0), 0.03, 1e-15);
+  EXPECT_NEAR(sigmaAt("ouster_os1", 20.0), 0.015, 1e-15);
+  for (const std::string name : {"velodyne_vlp16", "ouster_os1"})
+    EXPECT_TRUE(loadSensor(name).noise->isOmnidirectional()) << name;
 }
 
 TEST(BuiltInSensors, AnUnknownNameListsTheKnown)

@@ -1,4 +1,5 @@
 #include <holdfast/io/cloud_io.h>
+#include <holdfast/io/config.h>
 
 #include "support/own_covariances.h"
 #include "support/run_program.h"
@@ -144,6 +145,58 @@ TEST(InfoProgram, TheCameraOfAnImageIsSaid)
   const Json json = Json::parse(given.out);
   EXPECT_EQ(json["camera"]["fy"], 61.0);
   EXPECT_EQ(given.out.find("assumed"), std::string::npos);
+}
+
+/// A plane in every pixel of a camera.
+void
+saveWall(const std::string& path, const Camera& camera)
+{
+  pcl::PointCloud<pcl::PointXYZ>::Ptr points(
+      new pcl::PointCloud<pcl::PointXYZ>(static_cast<std::uint32_t>(camera.width),
+                                         static_cast<std::uint32_t>(camera.height)));
+  for (int v = 0; v < camera.height; ++v)
+    for (int u = 0; u < camera.width; ++u)
+      (*points)(u, v).getVector3fMap() =
+          camera.backProject(u, v, 1.5 + 1e-3 * u).cast<float>();
+  saveCloud(path, {points, {}, {}});
+}
+
+TEST(InfoProgram, NamesTheSensorsWhosePixelsTheseAre)
+{
+  const std::string folder = freshFolder("info_sensors");
+  const auto sensorsOf = [&](const Camera& camera) {
+    saveWall(folder + "/wall.pcd", camera);
+    const auto run = runProgram(folder, {"info", folder + "/wall.pcd", "--json", "-"});
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return Json::parse(run.out)["sensors"].get<std::vector<std::string>>();
+  };
+  for (const std::string name :
+       {"kinect_v1", "kinect_v2", "xtion", "azure_kinect", "zed_2", "iphone_lidar"})
+    EXPECT_EQ(sensorsOf(loadSensor(name).camera), std::vector<std::string>{name});
+  const auto text = runProgram(folder, {"info", folder + "/wall.pcd"});
+  EXPECT_NE(text.out.find("like         iphone_lidar\n"), std::string::npos)
+      << text.out;
+  // Both RealSense cameras have the same image.
+  EXPECT_EQ(sensorsOf(loadSensor("realsense_d455").camera),
+            (std::vector<std::string>{"realsense_d435", "realsense_d455"}));
+  EXPECT_TRUE(sensorsOf(test::smallCamera(40, 30)).empty());
+}
+
+TEST(InfoProgram, ABrokenSensorFileOfYourOwnIsSaid)
+{
+  const std::string folder = freshFolder("info_broken_sensor");
+  saveWall(folder + "/wall.pcd", loadSensor("xtion").camera);
+  test::writeFile(freshFolder("info_broken_sensor/own/sensors") + "/bad.yaml",
+                  "name: [\n");
+  const auto run = test::runExecutable(folder,
+                                       "/usr/bin/env",
+                                       {"HOLDFAST_CONFIG_DIR=" + folder + "/own",
+                                        HOLDFAST_PROGRAM,
+                                        "info",
+                                        folder + "/wall.pcd"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(run.out.find("like         xtion\n"), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find("no sensor to compare with: "), std::string::npos) << run.out;
 }
 
 TEST(InfoProgram, WrongInputOptionsAreUsageErrors)

@@ -112,6 +112,19 @@ TEST(RecoverIntrinsics, NothingWhereThereIsNoPinholeImage)
   }))) << "no point";
 }
 
+TEST(CameraTypes, DifferByMoreThanTheirCamerasDo)
+{
+  const Camera nominal = makeCamera(640, 480, 575.8);
+  Camera own = nominal;
+  own.fx = 590.0; // 2.5 %
+  own.cx += 15.0;
+  EXPECT_TRUE(isOfType(own, nominal));
+  EXPECT_FALSE(isOfType(makeCamera(640, 480, 525.0), nominal)) << "9 %";
+  EXPECT_FALSE(isOfType(makeCamera(320, 240, 575.8), nominal)) << "another size";
+  own.cy += 30.0;
+  EXPECT_FALSE(isOfType(own, nominal)) << "another window of the image";
+}
+
 TEST(MatchedSensor, KeepsACameraThatFits)
 {
   const Camera camera = makeCamera(640, 480, 575.8);

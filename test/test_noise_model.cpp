@@ -4,6 +4,7 @@
 #include <holdfast/sensor/noise_registry.h>
 #include <holdfast/sensor/parameter_error.h>
 #include <holdfast/sensor/stereo_noise_model.h>
+#include <holdfast/sensor/time_of_flight_noise_model.h>
 
 #include "support/random.h"
 
@@ -28,7 +29,9 @@ allModels()
                                {"sigma_per_m", 0.003},
                                {"sigma_per_m2", 0.0015},
                                {"sigma_lateral_rad", 0.0007},
-                               {"sigma_z_per_m2", 0.001425}};
+                               {"sigma_z_per_m2", 0.001425},
+                               {"best_depth_m", 0.8},
+                               {"sigma_incidence_m", 0.0001}};
   std::vector<NoiseModel::ConstPtr> models;
   for (const NoiseModelKind& kind : noiseModelKinds()) {
     NoiseParameters parameters;
@@ -264,6 +267,92 @@ TEST(DryanovskiNoise, IsTheImageModelAndTheBaseForSinglePoints)
   EXPECT_THROW(model.imageCovariances(points, 3, 2), std::invalid_argument);
   EXPECT_THROW(base->imageCovariances(points, -3, -3), std::invalid_argument);
   EXPECT_THROW(DryanovskiNoiseModel(nullptr), std::invalid_argument);
+}
+
+/// As published: mm of a depth in m.
+double
+fankhauser(double z, double theta)
+{
+  const double right = std::acos(0.0);
+  return 1.5 - 0.5 * z + 0.3 * z * z +
+         0.1 * std::pow(z, 1.5) * theta * theta / std::pow(right - theta, 2);
+}
+
+TEST(TimeOfFlightNoise, HasThePublishedDepthNoiseAlongTheRay)
+{
+  test::Random random;
+  TimeOfFlightNoiseModel::Parameters parameters;
+  parameters.sigma_point_px = 0.0;
+  const TimeOfFlightNoiseModel model(parameters);
+  for (int i = 0; i < 50; ++i) {
+    const Eigen::Vector3d q = randomPoint(random);
+    const double theta = random.uniform(0.0, 1.39); // below 80 degrees
+    const double sigma_z = 1e-3 * fankhauser(q.z(), theta);
+    const Eigen::Vector3d along = sigma_z / q.z() * q;
+    EXPECT_LT(relativeDifference(model.covariance(q, theta), along * along.transpose()),
+              1e-12);
+    EXPECT_EQ(model.covariance(q), model.covariance(q, 0.0));
+    // Nothing is worse than 80 degrees.
+    EXPECT_EQ(model.covariance(q, 1.45), model.covariance(q, std::acos(0.0)));
+  }
+}
+
+/// Points of an image of a camera of 365 px on the plane n^T q = 1.
+std::vector<Eigen::Vector3d>
+planeImage(const Eigen::Vector3d& n, int width, int height)
+{
+  std::vector<Eigen::Vector3d> points;
+  for (int v = 0; v < height; ++v)
+    for (int u = 0; u < width; ++u) {
+      const Eigen::Vector3d ray((u - 40.0) / 365.0, (v - 5.0) / 365.0, 1.0);
+      points.push_back(ray / n.dot(ray));
+    }
+  return points;
+}
+
+TEST(TimeOfFlightNoise, ImagesHaveTheIncidenceOfTheirPlanes)
+{
+  const TimeOfFlightNoiseModel model({});
+  for (const double degrees : {0.0, 30.0, 60.0, 75.0}) {
+    SCOPED_TRACE(degrees);
+    const double angle = degrees / 90.0 * std::acos(0.0);
+    const Eigen::Vector3d normal(std::sin(angle), 0.0, std::cos(angle));
+    const auto points = planeImage(normal / (1.5 * std::cos(angle)), 30, 20);
+    const auto image = model.imageCovariances(points, 30, 20);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const double theta =
+          std::acos(std::min(1.0, std::abs(normal.dot(points[i].normalized()))));
+      // The result is single precision; an angle near zero has half of the digits.
+      EXPECT_LT(relativeDifference(image[i].cast<double>(),
+                                   model.covariance(points[i], theta)),
+                1e-6);
+    }
+  }
+}
+
+TEST(TimeOfFlightNoise, OtherSurfacesAndHolesDoNotTiltAPixel)
+{
+  const TimeOfFlightNoiseModel model({});
+  auto points = planeImage({0.0, 0.0, 1.0}, 30, 20);
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (i % 30 >= 15)
+      points[i] *= 1.5; // a step
+  points[33] = Eigen::Vector3d::Constant(kNaN);
+  const auto image = model.imageCovariances(points, 30, 20);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (i == 33) {
+      EXPECT_TRUE(image[i].array().isNaN().all());
+      continue;
+    }
+    const double theta = std::acos(std::min(1.0, points[i].normalized().z()));
+    EXPECT_LT(
+        relativeDifference(image[i].cast<double>(), model.covariance(points[i], theta)),
+        1e-6);
+  }
+  EXPECT_EQ(model.imageCovariances({points[0]}, 1, 1)[0],
+            model.covariance(points[0]).cast<float>())
+      << "alone: facing";
+  EXPECT_THROW(model.imageCovariances(points, 3, 2), std::invalid_argument);
 }
 
 TEST(NoiseModels, RotateWithTheFrame)

@@ -6,7 +6,6 @@
 #include "spots.h"
 #include "walk_options.h"
 
-
 #include <CLI/CLI.hpp>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <fmt/core.h>

@@ -18,6 +18,8 @@
   extern template class pcl::search::KdTree<PointT>; \
   extern template class pcl::search::OrganizedNeighbor<PointT>;
 
-BOOST_PP_SEQ_FOR_EACH(HOLDFAST_COMPILED_SEARCH, , HOLDFAST_INPUT_POINT_TYPES)
+BOOST_PP_SEQ_FOR_EACH(HOLDFAST_COMPILED_SEARCH,
+                      ,
+                      HOLDFAST_INPUT_POINT_TYPES HOLDFAST_FURTHER_POINT_TYPES)
 
 #undef HOLDFAST_COMPILED_SEARCH

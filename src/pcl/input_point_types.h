@@ -9,3 +9,8 @@
   (pcl::PointXYZI)(pcl::PointXYZRGB)(pcl::PointXYZRGBA)(pcl::PointNormal)( \
       holdfast::PointXYZCovariance)
 #define HOLDFAST_INPUT_POINT_TYPES (pcl::PointXYZ) HOLDFAST_OTHER_POINT_TYPES
+
+// Each of these in a source of its own, further_*.cpp, which
+// HOLDFAST_ONLY_CORE_POINT_TYPES leaves out.
+#define HOLDFAST_FURTHER_POINT_TYPES \
+  (pcl::PointXYZL)(pcl::PointXYZRGBL)(pcl::PointXYZINormal)(pcl::PointXYZRGBNormal)

@@ -13,6 +13,8 @@ namespace {
 
 constexpr double kMaxFitResidualPx = 1.0;
 constexpr double kMaxCameraResidualPx = 2.0;
+/// Of cameras of one type.
+constexpr double kTypeTolerance = 0.05;
 /// "Nearly all" points.
 constexpr double kShareInFront = 0.99;
 /// Every n-th row and column is enough, unless that leaves too few points.
@@ -199,6 +201,19 @@ recoverIntrinsics(const RangeCloud& cloud, double* rms_px)
   camera.cx = fit.columns.centre();
   camera.cy = fit.rows.centre();
   return camera;
+}
+
+bool
+isOfType(const Camera& recovered, const Camera& camera)
+{
+  const auto near = [](double a, double b, double scale) {
+    return std::abs(a - b) <= kTypeTolerance * scale;
+  };
+  return recovered.width == camera.width && recovered.height == camera.height &&
+         near(recovered.fx, camera.fx, camera.fx) &&
+         near(recovered.fy, camera.fy, camera.fy) &&
+         near(recovered.cx, camera.cx, camera.width) &&
+         near(recovered.cy, camera.cy, camera.height);
 }
 
 Pose

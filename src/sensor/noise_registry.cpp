@@ -5,6 +5,7 @@
 #include <holdfast/sensor/noise_registry.h>
 #include <holdfast/sensor/quadratic_noise_model.h>
 #include <holdfast/sensor/stereo_noise_model.h>
+#include <holdfast/sensor/time_of_flight_noise_model.h>
 
 #include <algorithm>
 
@@ -72,6 +73,19 @@ makeDryanovski(const NoiseParameters& p)
   return std::make_shared<DryanovskiNoiseModel>(makeKhoshelham(p));
 }
 
+NoiseModel::ConstPtr
+makeTimeOfFlight(const NoiseParameters& p)
+{
+  TimeOfFlightNoiseModel::Parameters parameters;
+  parameters.sigma_m = p.at("sigma_m");
+  parameters.sigma_per_m2 = p.at("sigma_per_m2");
+  parameters.best_depth_m = valueOr(p, "best_depth_m", 0.0);
+  parameters.sigma_incidence_m = valueOr(p, "sigma_incidence_m", 0.0);
+  parameters.sigma_point_px = p.at("sigma_point_px");
+  parameters.focal_px = p.at("focal_px");
+  return std::make_shared<TimeOfFlightNoiseModel>(parameters);
+}
+
 void
 checkParameters(const NoiseModelKind& kind, const NoiseParameters& parameters)
 {
@@ -112,6 +126,14 @@ noiseModelKinds()
        makeQuadratic},
       {"khoshelham", pixel_depth, makeKhoshelham},
       {"dryanovski", pixel_depth, makeDryanovski},
+      {"time_of_flight",
+       {{"sigma_m"},
+        {"sigma_per_m2"},
+        {"best_depth_m", false},
+        {"sigma_incidence_m", false},
+        {"sigma_point_px"},
+        {"focal_px"}},
+       makeTimeOfFlight},
   };
   return kinds;
 }

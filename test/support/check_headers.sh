@@ -5,7 +5,8 @@
 #
 # CORE_DIRS and PCL_DIRS are folders of headers, with semicolons between: the first of
 # CORE_DIRS is checked, the others are what it may use. Only headers in holdfast/pcl/ and
-# holdfast/io/ may use PCL_DIRS; without those they are left out.
+# holdfast/io/ may use PCL_DIRS; without those they are left out, and visualization.h
+# where VTK is in none of them.
 set -euo pipefail
 
 compiler=$1
@@ -14,6 +15,11 @@ IFS=";" read -r -a pcl_dirs <<<"$3"
 include=${core_dirs[0]}
 core_flags=("${core_dirs[@]/#/-I}")
 pcl_flags=("${pcl_dirs[@]/#/-isystem}")
+
+vtk=
+for dir in "${pcl_dirs[@]}"; do
+  [[ -e $dir/vtkVersion.h ]] && vtk=$dir
+done
 
 # check HEADER flags...
 check() {
@@ -32,6 +38,7 @@ while IFS= read -r header; do
   flags=("${core_flags[@]}")
   if [[ $header == holdfast/@(pcl|io)/* ]]; then
     ((${#pcl_dirs[@]})) || continue
+    [[ $header == */visualization.h && -z $vtk ]] && continue
     flags+=("${pcl_flags[@]}")
   fi
   check "$header" "${flags[@]}" &

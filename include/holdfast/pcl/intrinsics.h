@@ -22,6 +22,12 @@ std::optional<double> pixelResidual(const RangeCloud& cloud, const Camera& camer
 std::optional<Camera> recoverIntrinsics(const RangeCloud& cloud,
                                         double* rms_px = nullptr);
 
+/// True when a cloud with the camera `recovered` may have been taken by a sensor with
+/// the nominal `camera`: images of the same size, focal lengths and principal points
+/// within 5 % of focal length and image, by which cameras of one type differ from each
+/// other.
+bool isOfType(const Camera& recovered, const Camera& camera);
+
 /// The frame of the points in a file, as a sensor pose. PCL's files disagree about
 /// VIEWPOINT: some hold points in the camera frame although VIEWPOINT carries a
 /// rotation (0 0 0 0 1 0 0) that is meant for display.

@@ -4,6 +4,7 @@
 #include <holdfast/pcl/patch_extraction.h>
 #include <holdfast/pcl/point_types.h>
 
+#include <pcl/PointIndices.h>
 #include <pcl/features/feature.h>
 
 #include <memory>
@@ -42,7 +43,9 @@ namespace holdfast {
 /// another number than the points, ...) is reported by PCL_ERROR, and the output is
 /// empty. Nothing throws.
 ///
-/// \tparam PointOutT PatchPoint, or any point type that shares fields with it.
+/// \tparam PointOutT PatchPoint, or any point type that shares fields with it. A field
+/// `curvature` (pcl::PointNormal) is the mean absolute curvature at the centre of the
+/// patch, (|k1| + |k2|) / 2 in 1/m: not PCL's share of an eigenvalue.
 template <typename PointInT, typename PointOutT = PatchPoint>
 class PatchEstimation : public pcl::Feature<PointInT, PointOutT> {
 public:
@@ -90,6 +93,22 @@ public:
   void setSensorPose(const std::optional<Pose>& pose)
   {
     sensor_pose_ = pose;
+    view_point_.reset();
+  }
+
+  /// The position alone, as of pcl::NormalEstimation: m, frame of the cloud. The axes
+  /// stay those that the cloud says. Of this and setSensorPose() the last one holds.
+  void setViewPoint(float x, float y, float z)
+  {
+    view_point_ = Eigen::Vector3d(x, y, z);
+    sensor_pose_.reset();
+  }
+
+  /// The cloud takes the place of setViewPoint() and setSensorPose() again.
+  void useSensorOriginAsViewPoint()
+  {
+    view_point_.reset();
+    sensor_pose_.reset();
   }
 
   /// Everything else: fit, sampler, covariance mode, validation, threads, progress. A
@@ -138,6 +157,25 @@ public:
     seeds_from_sampler_ = from_sampler;
   }
 
+  /// Remember the points of each patch; costs the search for its neighbourhood again.
+  void setKeepIndices(bool keep)
+  {
+    keep_indices_ = keep;
+  }
+
+  bool getKeepIndices() const
+  {
+    return keep_indices_;
+  }
+
+  /// With setKeepIndices(), the points that each patch of the last compute() was fitted
+  /// to, ascending, one entry per point of the output; empty where there is no patch.
+  /// Indices into the search surface, which is the input cloud unless set otherwise.
+  const std::vector<pcl::PointIndices>& getPatchIndices() const
+  {
+    return patch_indices_;
+  }
+
   /// The fits behind the points of the last compute(), one each, with everything in
   /// double precision; empty if it failed.
   const std::vector<ExtractedPatch>& getResults() const
@@ -183,12 +221,17 @@ private:
   RangeCloud rangeCloud();
   PatchSites sites() const;
   void extract();
+  void keepIndices(const RangeCloud& cloud,
+                   const ExtractionOptions& options,
+                   const PatchSites& sites);
   void computeFeature(PointCloudOut& output) override;
 
   Sensor sensor_;
   CovariancesConstPtr covariances_;
   std::optional<Pose> sensor_pose_;
+  std::optional<Eigen::Vector3d> view_point_;
   ExtractionOptions options_;
+  bool keep_indices_ = false;
   bool seeds_from_sampler_ = false;
   /// PCL's search, not our sampler, finds the neighbourhoods; and, if so, with a tree
   /// that the base made because the user gave none.
@@ -197,6 +240,7 @@ private:
   Pose used_sensor_pose_; ///< during compute()
   ExtractionResult result_; ///< with one entry per seed
   ExtractionResult former_; ///< whose memory the next one uses
+  std::vector<pcl::PointIndices> patch_indices_;
 
 public:
   PCL_MAKE_ALIGNED_OPERATOR_NEW

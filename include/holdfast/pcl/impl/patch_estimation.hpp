@@ -3,6 +3,7 @@
 #include <holdfast/pcl/conversions.h>
 #include <holdfast/pcl/impl/input_check.hpp>
 #include <holdfast/pcl/patch_estimation.h>
+#include <holdfast/pcl/patch_points.h>
 
 #include <pcl/common/copy_point.h>
 #include <pcl/common/point_tests.h>
@@ -15,9 +16,26 @@
 
 #include <algorithm>
 #include <exception>
+#include <limits>
 #include <utility>
 
 namespace holdfast {
+
+namespace detail {
+
+template <typename PointT>
+void
+copyPatch(const ExtractedPatch& patch, PointT& point)
+{
+  pcl::copyPoint(toPatchPoint(patch), point);
+  if constexpr (pcl::traits::has_curvature<PointT>::value)
+    point.curvature = isAccepted(patch) ?
+                          static_cast<float>(
+                              patch.fit.patch.principalCurvatures().cwiseAbs().mean()) :
+                          std::numeric_limits<float>::quiet_NaN();
+}
+
+} // namespace detail
 
 template <typename PointInT, typename PointOutT>
 std::string
@@ -59,6 +77,7 @@ PatchEstimation<PointInT, PointOutT>::initCompute()
 {
   former_ = std::move(result_);
   result_ = {};
+  patch_indices_.clear();
   if (!pcl::PCLBase<PointInT>::initCompute())
     return false;
   uses_search_ = tree_ || (surface_ && surface_ != input_);
@@ -125,6 +144,10 @@ PatchEstimation<PointInT, PointOutT>::rangeCloud()
     cloud.sensor_pose = *sensor_pose_;
     cloud.sensor_pose_given = true;
   }
+  if (view_point_) {
+    cloud.sensor_pose.c = *view_point_;
+    cloud.sensor_pose_given = true;
+  }
   if (covariances_)
     cloud.covariances = covariances_;
   return cloud;
@@ -167,9 +190,12 @@ PatchEstimation<PointInT, PointOutT>::extract()
   if (!samplesSeeds())
     options.sampler = withoutLimits(options.sampler);
   std::vector<std::string> notices = std::move(result_.notices);
-  result_ = extractPatches(cloud, sensor_, options, sites(), std::move(former_));
+  const PatchSites where = sites();
+  result_ = extractPatches(cloud, sensor_, options, where, std::move(former_));
   result_.notices.insert(result_.notices.begin(), notices.begin(), notices.end());
   used_sensor_pose_ = cloud.sensor_pose;
+  if (keep_indices_)
+    keepIndices(cloud, options, where);
   if (!samplesSeeds())
     return;
   // As indices, so that it is compute() that gives the output its size: a cloud must
@@ -177,6 +203,20 @@ PatchEstimation<PointInT, PointOutT>::extract()
   indices_ = pcl::make_shared<pcl::Indices>();
   for (const ExtractedPatch& patch : result_.patches)
     indices_->push_back(*patch.seed_index);
+}
+
+template <typename PointInT, typename PointOutT>
+void
+PatchEstimation<PointInT, PointOutT>::keepIndices(const RangeCloud& cloud,
+                                                  const ExtractionOptions& options,
+                                                  const PatchSites& sites)
+{
+  for (std::vector<int>& points :
+       pointsOfPatches(cloud, sensor_, options, sites, result_.patches)) {
+    pcl::PointIndices& indices = patch_indices_.emplace_back();
+    indices.header = (uses_search_ ? surface_ : input_)->header;
+    indices.indices.assign(points.begin(), points.end());
+  }
 }
 
 template <typename PointInT, typename PointOutT>
@@ -190,7 +230,7 @@ PatchEstimation<PointInT, PointOutT>::computeFeature(PointCloudOut& output)
   }
   const std::vector<ExtractedPatch>& patches = result_.patches;
   for (std::size_t i = 0; i < patches.size(); ++i)
-    pcl::copyPoint(toPatchPoint(patches[i]), output[i]);
+    detail::copyPatch(patches[i], output[i]);
   output.is_dense = std::all_of(patches.begin(), patches.end(), isAccepted);
   writeSensorPose(used_sensor_pose_, output);
 }

@@ -1,0 +1,3 @@
+#include "further_types.h"
+
+HOLDFAST_INSTANTIATE_ALL(pcl::PointXYZRGBNormal)
