@@ -39,6 +39,7 @@ constexpr const char* kExamples = R"(Examples:
                                             one patch to all points, as JSON
   holdfast map frames/ --poses trajectory.txt -o map.json
                                             patches of a moving camera, fused
+  holdfast collect results/ -o dataset.h5   patches of a data set as columns (HDF5)
   holdfast calibrate frames/ -o mine.yaml   how large is my camera's noise?
   holdfast experiment table1                are the covariances right?
 
@@ -86,6 +87,7 @@ run(int argc, char** argv)
   holdfast::app::addRenderCommand(app, exit_code);
   holdfast::app::addReportCommand(app, exit_code);
   holdfast::app::addCalibrateCommand(app, exit_code);
+  holdfast::app::addCollectCommand(app, exit_code);
   holdfast::app::addSimulateCommand(app, exit_code);
 #endif
 #ifdef HOLDFAST_HAVE_EXPERIMENTS

@@ -6,7 +6,7 @@
 # the same folder as it would have been.
 if(HOLDFAST_QUICKSTART)
   foreach(part BUILD_TESTS BUILD_SAMPLES BUILD_BENCHMARKS BUILD_EXPERIMENTS
-      WITH_OPENNI2 WITH_VIEWER)
+      WITH_HDF5 WITH_OPENNI2 WITH_VIEWER)
     set(HOLDFAST_${part} OFF)
   endforeach()
 endif()
@@ -17,7 +17,7 @@ set(quickstart_without
   src/uncertainty/stagewise src/uncertainty/second_order
   src/pcl/frame_extraction src/pcl/frame_mapping src/pcl/map_conversions
   src/io/patch_map_file src/io/atomic_folder src/io/range_frame src/io/trajectory_file
-  apps/calibrate/ apps/map/ apps/report/ apps/simulate/ apps/plot.cpp
+  apps/calibrate/ apps/collect/ apps/map/ apps/report/ apps/simulate/ apps/plot.cpp
   apps/result_input.cpp
   # All but what images of --dense are drawn with.
   apps/render/render.cpp apps/render/render_scene apps/render/render_settings
