@@ -12,6 +12,7 @@
 namespace holdfast::app {
 
 void addCalibrateCommand(CLI::App& app, int& exit_code);
+void addCollectCommand(CLI::App& app, int& exit_code);
 void addFitCommand(CLI::App& app, int& exit_code);
 void addInfoCommand(CLI::App& app, int& exit_code);
 void addMapCommand(CLI::App& app, int& exit_code);

@@ -34,7 +34,7 @@ option(HOLDFAST_WITH_PCL "Classes for PCL, files, programs" ${PCL_FOUND})
 if(NOT HOLDFAST_WITH_PCL)
   # Plain variables, which go before the options of the same names.
   foreach(part BUILD_APPS BUILD_SAMPLES BUILD_BENCHMARKS BUILD_EXPERIMENTS
-      WITH_OPENNI2 WITH_VIEWER WITH_PYTHON)
+      WITH_HDF5 WITH_OPENNI2 WITH_VIEWER WITH_PYTHON)
     set(HOLDFAST_${part} OFF)
   endforeach()
   return()
@@ -77,6 +77,15 @@ endif()
 # one comes first in the path.
 if(NOT HOLDFAST_QUICKSTART AND (NOT DEFINED HOLDFAST_WITH_PYTHON OR HOLDFAST_WITH_PYTHON))
   include(HoldfastPython)
+endif()
+
+# Columns of `holdfast collect`. Not looked for where they are not wanted.
+if(NOT DEFINED HOLDFAST_WITH_HDF5 OR HOLDFAST_WITH_HDF5)
+  find_package(HDF5 1.10 QUIET COMPONENTS C)
+  option(HOLDFAST_WITH_HDF5 "Data sets in columns" ${HDF5_FOUND})
+  if(HOLDFAST_WITH_HDF5 AND NOT HDF5_FOUND)
+    message(FATAL_ERROR "HOLDFAST_WITH_HDF5 needs libhdf5-dev 1.10 or newer")
+  endif()
 endif()
 
 if(HOLDFAST_BUILD_APPS)

@@ -6,7 +6,7 @@
 # the same folder as it would have been.
 if(HOLDFAST_QUICKSTART)
   foreach(part BUILD_TESTS BUILD_SAMPLES BUILD_BENCHMARKS BUILD_EXPERIMENTS
-      WITH_OPENNI2 WITH_VIEWER WITH_PYTHON)
+      WITH_HDF5 WITH_OPENNI2 WITH_VIEWER WITH_PYTHON)
     set(HOLDFAST_${part} OFF)
   endforeach()
 endif()
@@ -19,7 +19,8 @@ set(quickstart_without
   src/pcl/patch_points src/pcl/print
   src/io/patch_map_file src/io/foot_file src/io/atomic_folder src/io/range_frame
   src/io/trajectory_file
-  apps/calibrate/ apps/map/ apps/report/ apps/risk/ apps/simulate/ apps/plot.cpp
+  apps/calibrate/ apps/collect/ apps/map/ apps/report/ apps/risk/ apps/simulate/
+  apps/plot.cpp
   apps/result_input.cpp
   # All but what images of --dense are drawn with.
   apps/render/render.cpp apps/render/render_scene apps/render/render_settings

@@ -1,6 +1,8 @@
+#include "batch.h"
 #include "commands.h"
 #include "console.h"
 #include "dense_output.h"
+#include "fingerprint.h"
 #include "fit_settings.h"
 #include "patch_output.h"
 #include "summary.h"
@@ -39,12 +41,18 @@ constexpr const char* kExamples = R"(Examples:
       at most 200 planes bounded by rectangles
   holdfast fit depth.png --dense 4 -o results
       a patch at every fourth pixel, as an organized cloud and as images
+  holdfast fit --manifest clouds.txt --shard 3/16 --resume -o results
+      the third of sixteen parts of a data set, as far as it is not done yet
 
 Covariances of the points come from the field 'covariance' of a PCD (six floats xx xy xz
 yy yz zz, m^2), else from the sensor; the sensor's pose comes from VIEWPOINT. In the
 table, sigma of the normal is its rms angle and sigma of the centre its rms distance from
 where a cloud without noise would have put them. A cloud that yields no patch counts as
 failed.
+
+With --manifest, each cloud leaves either its results or NAME.failed.json with the
+reason. Exit codes there: 0 all done, 2 finished with clouds that failed, 1 wrong usage
+or an error of reading the list or of writing.
 )";
 
 /// Where the results go.
@@ -143,7 +151,7 @@ template <typename Run>
 auto
 withProgress(const FitSettings& settings, Run&& run)
 {
-  ProgressBar bar("fitting", !settings.quiet);
+  ProgressBar bar("fitting", !settings.quiet && settings.manifest.empty());
   ExtractionOptions options = settings.extraction.options;
   options.progress = [&bar](int done, int total) { bar.update(done, total); };
   return run(options);
@@ -213,6 +221,46 @@ fitDense(const std::string& path,
   return clean;
 }
 
+/// A report of the cloud, with everything but the patches.
+PatchReport
+reportOf(const std::string& path, const Input& input, const FitSettings& settings)
+{
+  PatchReport report;
+  report.cloud = path;
+  report.fingerprint = settings.fingerprint;
+  report.options = settings.extraction.options;
+  report.whole = settings.whole;
+  report.file = input.file;
+  report.sensor_pose = input.cloud.sensor_pose;
+  report.offset = input.cloud.offset;
+  report.covariances_of_cloud = input.cloud.hasCovariances();
+  return report;
+}
+
+/// Fits the cloud of a file. \param clean false when some covariances are none.
+/// \throw std::runtime_error when there is no patch.
+PatchReport
+fitReport(const std::string& path,
+          const Input& input,
+          double load_ms,
+          const FitSettings& settings,
+          bool& clean)
+{
+  PatchReport report = reportOf(path, input, settings);
+  report.load_ms = load_ms;
+  const Stopwatch fitting;
+  report.result = extract(input.cloud, input.sensor, settings);
+  report.fit_ms = fitting.milliseconds();
+  std::vector<std::string>& notices = report.result.notices;
+  notices.insert(notices.begin(), input.notices.begin(), input.notices.end());
+  if (!settings.quiet && settings.manifest.empty())
+    printNotices(path, notices);
+  clean = checkCovariances(path, report.result.points);
+  if (report.result.patches.empty())
+    failWithoutPatches(path, report.result);
+  return report;
+}
+
 /// The road from a file to its patches.
 /// \return false when the results are written but some covariances of the cloud are
 /// none.
@@ -222,42 +270,38 @@ fitCloud(const std::string& path,
          const FitSettings& settings,
          Output& output)
 {
-  PatchReport report;
-  report.cloud = path;
-  report.options = settings.extraction.options;
-  report.whole = settings.whole;
-
   const Stopwatch loading;
   const Input input = loadInput(path, nominal, settings);
-  report.file = input.file;
-  report.sensor_pose = input.cloud.sensor_pose;
-  report.offset = input.cloud.offset;
-  report.covariances_of_cloud = input.cloud.hasCovariances();
-  report.load_ms = loading.milliseconds();
+  const double load_ms = loading.milliseconds();
   if (settings.dense_stride > 0)
-    return fitDense(path, input, report.load_ms, settings, output);
-
-  const Stopwatch fitting;
-  report.result = extract(input.cloud, input.sensor, settings);
-  report.fit_ms = fitting.milliseconds();
-  std::vector<std::string>& notices = report.result.notices;
-  notices.insert(notices.begin(), input.notices.begin(), input.notices.end());
-
-  if (!settings.quiet)
-    printNotices(path, notices);
-  const bool clean = checkCovariances(path, report.result.points);
-  if (report.result.patches.empty())
-    failWithoutPatches(path, report.result);
-  output.write(report);
+    return fitDense(path, input, load_ms, settings, output);
+  bool clean = true;
+  output.write(fitReport(path, input, load_ms, settings, clean));
   return clean;
+}
+
+/// The clouds of a list. \return the exit code.
+int
+fitManifest(const Sensor& sensor, const FitSettings& settings)
+{
+  return runBatch(settings, [&](const std::string& path) {
+    const Stopwatch loading;
+    const Input input = loadInput(path, sensor, settings);
+    bool ignored = true; // it has been said, and the counts are in the results
+    return fitReport(path, input, loading.milliseconds(), settings, ignored);
+  });
 }
 
 int
 runFit(const CLI::App& command, FitSettings& settings)
 {
   finishExtractionOptions(command, settings.extraction);
+  finishBatchOptions(command, settings);
   const Sensor named = loadSensorOption(settings.input.sensor_name);
   const Sensor sensor = settings.no_pattern ? withoutPattern(named) : named;
+  settings.fingerprint = fingerprintOf(command, sensor);
+  if (!settings.manifest.empty())
+    return fitManifest(sensor, settings);
   Output output(settings);
   const int exit_code =
       forEachCloud(settings.input.clouds, [&](const std::string& path) {

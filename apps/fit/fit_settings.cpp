@@ -123,7 +123,70 @@ addOutputOptions(CLI::App& command, FitSettings& settings)
   addQuietOption(command, settings.quiet);
 }
 
+constexpr EnumNames<BatchFormat, 2> kBatchFormatNames{{"json", "h5"}};
+
+/// Many clouds in one process of many.
+void
+addBatchOptions(CLI::App& command, FitSettings& settings)
+{
+  const std::string group = "Data sets";
+  command.get_option("CLOUD")->required(false);
+  command
+      .add_option("--manifest",
+                  settings.manifest,
+                  "List of clouds, one path per line; behind a tab a name for its "
+                  "results where that of the file will not do")
+      ->type_name("LIST")
+      ->group(group);
+  command
+      .add_option_function<std::string>(
+          "--shard",
+          [&settings](const std::string& text) { settings.shard = *parseShard(text); },
+          "Of N parts of the list the I-th, 1 <= I <= N; names decide which cloud "
+          "belongs where, so that more clouds move none")
+      ->check(CLI::Validator(
+          [](const std::string& text) {
+            return parseShard(text) ? std::string() : text + " is no part I/N";
+          },
+          "I/N"))
+      ->type_name("")
+      ->group(group);
+  command
+      .add_flag("--resume",
+                settings.resume,
+                "Leave clouds whose results, or record of failure, are there and were "
+                "made by the same version, options and sensor")
+      ->group(group);
+  command
+      .add_flag("--retry-failed", settings.retry_failed, "But try those that failed")
+      ->needs(command.get_option("--resume"))
+      ->group(group);
+  addChoice(command,
+            "--format",
+            settings.format,
+            kBatchFormatNames,
+            "Write the files of -o, or columns, NAME.patches.h5, which take a sixth of "
+            "the space")
+      ->default_str("json")
+      ->group(group);
+}
+
 } // namespace
+
+void
+finishBatchOptions(const CLI::App& command, const FitSettings& settings)
+{
+  if (!settings.manifest.empty()) {
+    if (settings.output_folder.empty())
+      throw CLI::ValidationError("--manifest", "needs -o");
+    return;
+  }
+  for (const char* option : {"--shard", "--resume", "--format"})
+    if (command.count(option) > 0)
+      throw CLI::ValidationError(option, "goes with --manifest only");
+  if (settings.input.clouds.empty())
+    throw CLI::RequiredError("CLOUD");
+}
 
 void
 addFitOptions(CLI::App& command, FitSettings& settings)
@@ -134,7 +197,9 @@ addFitOptions(CLI::App& command, FitSettings& settings)
   addExtractionOptions(command, settings.extraction);
   addSeedOptions(command, settings.extraction.options.sampler);
   addOutputOptions(command, settings);
+  addBatchOptions(command, settings);
   excludeFromExtents(command);
+  exclude(command, "--manifest", {"CLOUD", "--dense", "--json"});
   tidyHelp(command);
 }
 

@@ -3,10 +3,18 @@
 
 #include "extraction_options.h"
 #include "input_options.h"
+#include "manifest.h"
 
+#include <cstdint>
 #include <string>
 
 namespace holdfast::app {
+
+/// What the results of a manifest's clouds are written as.
+enum class BatchFormat : std::uint8_t {
+  Json, ///< NAME.patches.json, .pcd and .ply
+  Columns ///< NAME.patches.h5
+};
 
 /// Everything the command line of `holdfast fit` decides.
 struct FitSettings {
@@ -19,9 +27,19 @@ struct FitSettings {
   std::string output_folder; ///< empty: no files
   std::string json_path; ///< empty: none; "-": standard output
   bool quiet = false;
+  std::string manifest; ///< list of clouds; empty: none
+  Shard shard; ///< of the manifest
+  BatchFormat format = BatchFormat::Json;
+  bool resume = false; ///< leave what is done
+  bool retry_failed = false;
+  std::string fingerprint; ///< of sensor and options (fingerprint.h)
 };
 
 /// Adds the options to the command. `settings` must outlive the parsing.
 void addFitOptions(CLI::App& command, FitSettings& settings);
+
+/// Checks what no single option can see. \throw CLI::ParseError on a command line with
+/// neither clouds nor a manifest, or with what only goes with one.
+void finishBatchOptions(const CLI::App& command, const FitSettings& settings);
 
 } // namespace holdfast::app

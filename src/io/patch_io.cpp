@@ -774,6 +774,8 @@ writeJson(std::ostream& out, const PatchReport& report, JsonLayout layout)
   out << '{' << gap;
   member("holdfast", HOLDFAST_VERSION);
   member("schema", kSchema);
+  if (!report.fingerprint.empty())
+    member("fingerprint", report.fingerprint);
   member("cloud", report.cloud);
   if (report.map)
     member("is_map", true);
@@ -802,6 +804,7 @@ readJson(const std::string& text)
     requireKnownSchema(json);
     PatchReport report;
     report.cloud = json.at("cloud");
+    report.fingerprint = json.value("fingerprint", "");
     report.is_of_map = json.value("is_map", false);
     const double containment =
         json.at("options").value("containment", FitOptions{}.containment);

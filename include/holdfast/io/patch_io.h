@@ -18,6 +18,9 @@ namespace holdfast {
 /// Everything a result file says about one cloud.
 struct PatchReport {
   std::string cloud; ///< file, or frame, the patches come from
+  /// A word for what the patches were made with, such as a hash of version, options and
+  /// sensor; empty: none.
+  std::string fingerprint;
   std::optional<std::uint64_t> timestamp_us; ///< of a frame, by the camera's clock
   std::optional<CloudFileInfo> file; ///< what was said and done when it was read
   Pose sensor_pose;
@@ -48,9 +51,9 @@ enum class JsonLayout : std::uint8_t {
 /// null where it was not asked for; chi-square over chi2_expected is the fit's.
 void writeJson(std::ostream& out, const PatchReport& report, JsonLayout layout);
 
-/// Reads the cloud's name, the offset, the patches and the rejected counts of a JSON
-/// object written by writeJson(); the other members of the report keep their defaults.
-/// Positions are again those of the points, with the offset taken off.
+/// Reads the cloud's name, the fingerprint, the offset, the patches and the rejected
+/// counts of a JSON object written by writeJson(); the other members of the report keep
+/// their defaults. Positions are again those of the points, with the offset taken off.
 /// \throw std::runtime_error when the text is no such object.
 PatchReport readJson(const std::string& text);
 
