@@ -82,7 +82,7 @@ causeOfNone(const RiskReport& report)
   if (r.unseen == r.candidates)
     return "the map tells of none of its patches where it was seen (no support grids), "
            "and without that there is no risk";
-  if (r.without_support == 0)
+  if (r.not_facing > r.without_support)
     return fmt::format("no patch faces a load along {}; most face one along {}: "
                        "--load-direction {}",
                        vectorText(report.options.load_direction),

@@ -72,6 +72,8 @@ struct Evidence {
 std::optional<Evidence>
 evidenceOf(const MapPatch& patch, const Eigen::Vector3d& load_direction)
 {
+  if (patch.anchor.R.col(2).dot(load_direction) >= 0.0)
+    return std::nullopt; // seen from the other side
   Placement placement;
   placement.load_direction = load_direction;
   placement.point = patch.anchor.c;
