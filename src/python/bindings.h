@@ -20,6 +20,8 @@ void bindExtract(py::module_& module);
 void bindSimulation(py::module_& module);
 void bindCalibration(py::module_& module);
 void bindPatchMap(py::module_& module);
+void bindFoot(py::module_& module);
+void bindContact(py::module_& module);
 
 /// A rigid transform as a (4, 4) matrix.
 /// \throw py::value_error for what is none.

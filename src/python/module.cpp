@@ -60,4 +60,6 @@ PYBIND11_MODULE(_core, module)
   bindSimulation(module);
   bindCalibration(module);
   bindPatchMap(module);
+  bindFoot(module);
+  bindContact(module);
 }

@@ -3,6 +3,7 @@
 
 #include "arrays.h"
 #include "keywords.h"
+#include "package_files.h"
 #include "sensor_object.h"
 
 #include <holdfast/io/config.h>
@@ -12,48 +13,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <limits>
-#include <set>
 
 namespace holdfast::python {
 namespace {
-
-namespace fs = std::filesystem;
-
-/// Where the package has its sensors; empty: nowhere.
-std::string&
-packageFolder()
-{
-  static std::string folder;
-  return folder;
-}
-
-std::set<std::string>
-sensorNames()
-{
-  const std::vector<std::string> known = listSensors();
-  std::set<std::string> names(known.begin(), known.end());
-  std::error_code ignored;
-  for (const fs::directory_entry& entry :
-       fs::directory_iterator(packageFolder(), ignored))
-    if (entry.path().extension() == ".yaml")
-      names.insert(entry.path().stem().string());
-  return names;
-}
-
-/// What the library's loader finds itself stays as it is.
-std::string
-foundInPackage(const std::string& name_or_path)
-{
-  const std::vector<std::string> known = listSensors();
-  const fs::path here = fs::path(packageFolder()) / (name_or_path + ".yaml");
-  std::error_code ignored;
-  const bool is_named = fs::path(name_or_path).filename() == name_or_path &&
-                        !fs::exists(name_or_path, ignored) &&
-                        std::count(known.begin(), known.end(), name_or_path) == 0;
-  return is_named && fs::is_regular_file(here, ignored) ? here.string() : name_or_path;
-}
 
 SensorObject
 load(const py::object& name_or_path)
@@ -61,7 +24,7 @@ load(const py::object& name_or_path)
   const py::object path = py::module_::import("os").attr("fspath")(name_or_path);
   const std::string name = readText("name_or_path", path);
   try {
-    return SensorObject(loadSensor(foundInPackage(name)));
+    return SensorObject(loadSensor(foundInPackage("sensors", listSensors(), name)));
   }
   catch (const std::runtime_error& error) {
     throw py::value_error(error.what());
@@ -309,10 +272,7 @@ bindMaking(SensorClass& type)
           "and key where there is no such sensor or something is wrong in the file.")
       .def_static(
           "names",
-          [] {
-            const std::set<std::string> names = sensorNames();
-            return std::vector<std::string>(names.begin(), names.end());
-          },
+          [] { return builtInNames("sensors", listSensors()); },
           "names() -> list of str\n\nBuilt-in sensors.")
       .def_static(
           "make",
@@ -413,7 +373,7 @@ bindSensor(py::module_& module)
         return "<holdfast.Sensor: " + s.sensor().name + ", " +
                s.sensor().noise->name() + ">";
       });
-  module.def("_set_sensor_folder",
+  module.def("_set_package_folder",
              [](const std::string& folder) { packageFolder() = folder; });
 }
 

@@ -40,6 +40,12 @@ def test_covariance_check(tmp_path):
     assert (tmp_path / "covariance_check.png").stat().st_size > 5000
 
 
+def test_foothold_ranking(tmp_path):
+    out = run(SAMPLES / "foothold_ranking.py", folder=tmp_path)
+    assert int(re.search(r"(\d+) footholds on", out).group(1)) > 5
+    assert (tmp_path / "foothold_ranking.png").stat().st_size > 5000
+
+
 def test_every_sample_is_tested():
     source = Path(__file__).read_text()
     for sample in SAMPLES.glob("*.py"):

@@ -22,6 +22,7 @@ xy = np.random.default_rng(1).uniform(-0.05, 0.05, (100, 2))
 points = np.column_stack([xy, 1.0 + (xy ** 2).sum(axis=1)])
 sensor = holdfast.Sensor.load("kinect_v1")
 patch = holdfast.fit(points, sensor=sensor)
+assert "humanoid_foot" in holdfast.Foot.names()
 assert patch.ok and patch.covariance.shape[0] > 7
 image = holdfast.simulate("rocks", sensor, stride=8)
 assert len(holdfast.extract(image.points, sensor, radius_m=0.1)) > 0
@@ -58,7 +59,7 @@ def wheel(tmp_path_factory):
 
 def test_holds_the_module_its_types_and_sensors(wheel):
     names = zipfile.ZipFile(wheel).namelist()
-    for name in ("__init__.py", "_core.pyi", "py.typed", "sensors/kinect_v1.yaml"):
+    for name in ("__init__.py", "_core.pyi", "py.typed", "sensors/kinect_v1.yaml", "feet/point_foot.yaml"):
         assert f"holdfast/{name}" in names
     (module,) = [name for name in names if re.fullmatch(r"holdfast/_core\..*so", name)]
     metadata = zipfile.ZipFile(wheel).read(

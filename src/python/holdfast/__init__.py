@@ -4,6 +4,8 @@
     >>> patch = holdfast.fit(points, covariances)       # one patch: help(holdfast.fit)
     >>> sensor = holdfast.Sensor.load("kinect_v1")
     >>> patches = holdfast.extract(image, sensor)       # all of an image
+    >>> foot = holdfast.Foot.load("humanoid_foot")      # may it step there?
+    >>> ranking = holdfast.rank_footholds(patch_map, foot)
 
 Lengths are in metres, angles in radians, curvatures in 1/m; cameras look along +z with
 x to the right and y down. Arrays of another kind than float64 in C order are copied.
@@ -13,6 +15,11 @@ import os as _os
 
 from . import _core
 from ._core import (
+    RISK_ASSUMPTIONS,
+    ContactRisk,
+    ContactRisks,
+    Foot,
+    FootholdRanking,
     Patch,
     Patches,
     PatchMap,
@@ -20,31 +27,50 @@ from ._core import (
     Simulation,
     __version__,
     calibrate,
+    contact_risk,
     extract,
     fit,
     fit_many,
+    rank_footholds,
     scene_names,
     simulate,
 )
 
-_core._set_sensor_folder(_os.path.join(_os.path.dirname(__file__), "sensors"))
+_core._set_package_folder(_os.path.dirname(__file__))
 
 __all__ = [
+    "ContactRisk",
+    "ContactRisks",
+    "Foot",
+    "FootholdRanking",
     "Patch",
     "PatchMap",
     "Patches",
+    "RISK_ASSUMPTIONS",
     "Sensor",
     "Simulation",
     "__version__",
     "calibrate",
+    "contact_risk",
     "extract",
     "fit",
     "fit_many",
+    "rank_footholds",
     "scene_names",
     "simulate",
 ]
 
 # What users see, in messages and in help().
-for _thing in (Patch, Patches, PatchMap, Sensor, Simulation):
+for _thing in (
+    ContactRisk,
+    ContactRisks,
+    Foot,
+    FootholdRanking,
+    Patch,
+    Patches,
+    PatchMap,
+    Sensor,
+    Simulation,
+):
     _thing.__module__ = __name__
 del _thing
