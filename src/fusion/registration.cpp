@@ -297,6 +297,12 @@ public:
     return null_space_;
   }
 
+  /// True where the step goes back some of another one's way.
+  bool isAgainst(const JetVector& other) const
+  {
+    return step_.dot(information_ * other) < 0.0;
+  }
+
   /// Length of the step in sigmas.
   double stepInSigmas() const
   {
@@ -399,10 +405,23 @@ private:
       result_.status = RegistrationStatus::NotObservable;
       return;
     }
-    result_.pose = moved(result_.pose, equations.step());
-    if (!is_robust && equations.stepInSigmas() <= options_.step_tolerance_sigma)
+    if (!is_robust)
+      damp(equations);
+    result_.pose = moved(result_.pose, damping_ * equations.step());
+    if (!is_robust &&
+        damping_ * equations.stepInSigmas() <= options_.step_tolerance_sigma)
       result_.status = RegistrationStatus::Converged;
     reach_ = std::max(last_reach_, 0.5 * reach_);
+  }
+
+  /// Curvatures without their noise are smaller than the true ones, so that steps may
+  /// be more than twice too long, and then never end.
+  void damp(const NormalEquations& equations)
+  {
+    constexpr double kLeast = 0.25;
+    if (equations.isAgainst(last_step_))
+      damping_ = std::max(kLeast, 0.5 * damping_);
+    last_step_ = equations.step();
   }
 
   /// Where the pose may be far off: patches of further around, none of them trusted.
@@ -468,6 +487,8 @@ private:
   const RegistrationOptions& options_;
   double lever_, last_reach_, reach_;
   int gated_steps_ = 0;
+  double damping_ = 1.0;
+  JetVector last_step_ = JetVector::Zero();
   std::vector<Match> kept_;
   RegistrationResult result_;
 };
