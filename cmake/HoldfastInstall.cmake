@@ -22,7 +22,7 @@ install(DIRECTORY ${PROJECT_SOURCE_DIR}/config
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 if(TARGET holdfast)
   install(TARGETS holdfast)
-  foreach(module holdfast_viewer holdfast_comparison)
+  foreach(module holdfast_viewer holdfast_columns holdfast_comparison)
     if(TARGET ${module})
       install(TARGETS ${module} DESTINATION ${CMAKE_INSTALL_LIBDIR}/holdfast)
     endif()
