@@ -19,8 +19,8 @@ constexpr const char* kExamples = R"(Examples:
 This program was built by samples/quickstart.sh, which leaves out all commands but
 these two. From the folder of the project,
   cmake -S . -B build && cmake --build build
-builds the others as well: live, record, map, risk, render, report, calibrate, simulate,
-experiment.
+builds the others as well: live, record, map, risk, render, report, collect, calibrate,
+simulate, experiment.
 'holdfast COMMAND --help' explains a command.
 Exit codes: 0 all done, 1 something failed, 2 wrong usage; others: fit --manifest.
 )";

@@ -39,7 +39,7 @@ if(PROJECT_IS_TOP_LEVEL)
 endif()
 if(TARGET holdfast)
   install(TARGETS holdfast COMPONENT program)
-  foreach(module holdfast_viewer holdfast_comparison)
+  foreach(module holdfast_viewer holdfast_columns holdfast_comparison)
     if(TARGET ${module})
       install(TARGETS ${module}
         DESTINATION ${CMAKE_INSTALL_LIBDIR}/holdfast COMPONENT program)
