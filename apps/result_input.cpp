@@ -65,6 +65,13 @@ readResultText(const std::string& path)
 PatchReport
 parseResult(const std::string& path, const std::string& text)
 {
+  if (text.find("\"footholds\":") != std::string::npos)
+    throw std::runtime_error(path + ": is a result of 'holdfast risk', which 'holdfast "
+                                    "render --color risk' draws");
+  if (fs::path(path).extension() == ".map")
+    throw std::runtime_error(path +
+                             ": is a map as 'holdfast map' goes on with it; with "
+                             "-o FILE.json it writes one to look at");
   try {
     PatchReport report = readJson(text);
     for (const ExtractedPatch& patch : report.result.patches)

@@ -160,11 +160,7 @@ loadSubject(const std::string& result, const RenderSettings& settings)
 {
   if (settings.risk)
     return riskSubject(result, settings);
-  const std::string text = readResultText(result);
-  if (text.find("\"footholds\":") != std::string::npos)
-    throw std::runtime_error(result + ": is a result of 'holdfast risk': --color risk "
-                                      "draws it");
-  const PatchReport report = parseResult(result, text);
+  const PatchReport report = parseResult(result, readResultText(result));
   if (report.result.patches.empty())
     throw std::runtime_error(result + ": has no patch");
   std::vector<ExtractedPatch> patches = patchesOf(result, report, settings);

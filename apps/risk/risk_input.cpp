@@ -5,6 +5,11 @@
 #include <holdfast/pcl/frame_mapping.h>
 #include <holdfast/pcl/intrinsics.h>
 
+#include <pcl/common/point_tests.h>
+
+#include <Eigen/Geometry>
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <filesystem>
 #include <mutex>
@@ -22,6 +27,27 @@ radiusFor(const Foot& foot)
   // Smaller patches have too few points of a depth camera at 1 m to be sure of a slope.
   constexpr double kBeyond = 1.1, kLeast = 0.04; // share, m
   return std::max(kBeyond * soleReach(foot), kLeast);
+}
+
+/// A patch as large as half of the cloud is none of the surface, and takes all points
+/// at each of its seeds. \throw std::runtime_error "PATH: cause".
+void
+requireRoomFor(double radius_m,
+               const pcl::PointCloud<pcl::PointXYZ>& points,
+               const std::string& path)
+{
+  Eigen::AlignedBox3d box;
+  for (const pcl::PointXYZ& point : points)
+    if (pcl::isFinite(point))
+      box.extend(point.getVector3fMap().cast<double>());
+  if (!box.isEmpty() && radius_m > 0.5 * box.diagonal().norm())
+    throw std::runtime_error(fmt::format(
+        "{}: patches of a radius of {:.3g} m, as the foot or --radius wants "
+        "them, are too large for this cloud, which is {:.3g} m across; is "
+        "its unit right (--unit)?",
+        path,
+        radius_m,
+        box.diagonal().norm()));
 }
 
 /// A map of a cloud without rows and columns, which FrameMapper does not take.
@@ -68,6 +94,7 @@ groundOfCloud(const RiskSettings& settings, const Foot& foot)
   if (!cloud.sensor_pose_given || cloud.sensor_pose.R.isIdentity())
     ground.image_down = cloud.sensor_pose.R.col(1);
   ground.radius_m = settings.radius_m.value_or(radiusFor(foot));
+  requireRoomFor(ground.radius_m, *cloud.points, settings.source);
 
   ExtractionOptions extraction;
   extraction.sampler.radius_m = ground.radius_m;

@@ -24,6 +24,23 @@ facedLoad(const PatchMap& map)
   return sum.normalized();
 }
 
+/// A line where most patches face another load than the one that was taken, as level
+/// ground does where a camera looks down at it and its own frame's axis was taken.
+std::string
+facingHint(const RiskReport& report)
+{
+  constexpr double kFar = 0.35; // rad; a slope as steep is for climbing
+  const Eigen::Vector3d faced = facedLoad(report.ground.map);
+  const Eigen::Vector3d taken = report.options.load_direction.normalized();
+  const double angle = std::atan2(faced.cross(taken).norm(), faced.dot(taken));
+  if (!(angle > kFar))
+    return "";
+  return fmt::format(
+      "Most patches face a load along {}, {:.0f} degrees from this one.\n",
+      vectorText(faced),
+      angle * 180.0 / kPi);
+}
+
 /// Probabilities as people read them.
 std::string
 percent(double probability)
@@ -135,7 +152,7 @@ riskTable(const RiskReport& report)
   for (const auto& [count, what] : parts)
     if (count > 0)
       text += fmt::format(", {} {}", count, what);
-  return text + "\n";
+  return text + "\n" + facingHint(report);
 }
 
 } // namespace holdfast::app
