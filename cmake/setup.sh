@@ -2,13 +2,16 @@
 # project: installs packages, configures, builds.
 # shellcheck shell=bash disable=SC2154
 
-# Packages of the given groups ("build test") that are not installed.
+# Packages of the given groups ("build test") that are not installed. What is there as a
+# command counts, wherever it comes from: Node.js of other sources brings its own npm and
+# conflicts with Debian's.
 missing_packages() {
   local package
   awk -v groups=" $* " '/^[a-z]/ && index(groups, " " $1 " ") { print $2 }' \
     "$root/cmake/debian-packages.txt" |
     while read -r package; do
-      dpkg-query -W -f='${db:Status-Abbrev}' "$package" 2>/dev/null | grep -q '^ii' ||
+      command -v "$package" >/dev/null ||
+        dpkg-query -W -f='${db:Status-Abbrev}' "$package" 2>/dev/null | grep -q '^ii' ||
         printf '%s\n' "$package"
     done
 }
