@@ -1,6 +1,6 @@
 # Man pages, made by the program that they are of as soon as it is built; not where it
 # cannot run, and not for a first look.
-if(HOLDFAST_QUICKSTART OR CMAKE_CROSSCOMPILING OR NOT UNIX)
+if(NOT TARGET holdfast OR HOLDFAST_QUICKSTART OR CMAKE_CROSSCOMPILING OR NOT UNIX)
   return()
 endif()
 set(man_folder ${PROJECT_BINARY_DIR}/man1)
