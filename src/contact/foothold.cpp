@@ -15,8 +15,7 @@ namespace holdfast {
 namespace contact {
 namespace {
 
-/// What totals are worked out to: differences below it are rounding, and decide
-/// nothing.
+/// Differences of totals below it decide nothing: no foot is safer for them.
 constexpr double kTotalStep = 1e-6;
 
 double

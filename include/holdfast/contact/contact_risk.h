@@ -22,9 +22,9 @@ namespace holdfast {
 /// Written beside every result.
 inline constexpr std::array<std::string_view, 6> kRiskAssumptions{
     "the surface is rigid and bears the load wherever it was seen",
-    "errors of the surface are Gaussian with the covariance of its patch; what of it "
-    "is "
-    "no quadric is an isotropic random field of third derivatives",
+    "errors of a surface are Gaussian with the covariance of its patch; its slope and "
+    "curvatures, and what of it is no quadric, are those of a kind of surface in the "
+    "map",
     "friction is lognormal and independent of the surface; slip is the load leaving "
     "the "
     "friction cone about the normal, without torque",

@@ -39,8 +39,8 @@ struct Foothold {
 struct FootholdRanking {
   /// Every patch at its best yaw, in the order of the map, also without quality.
   std::vector<Foothold> tried;
-  /// All with their quality, best first: by total risk in steps of 1e-6, which is what
-  /// it is worked out to, then by contact area.
+  /// All with their quality, best first: by total risk in steps of 1e-6, then by
+  /// contact area.
   std::vector<Foothold> footholds;
   int candidates = 0; ///< patches of the map
   int unseen = 0; ///< patches whose support is empty: a map without support grids
