@@ -197,8 +197,8 @@ fit(const py::object& points,
   return {patch};
 }
 
-/// What a fit takes without Python, for the test that looks at what Python adds: the
-/// fastest of many, s.
+/// What a fit takes without Python, for test/benchmark/python_call.py: the fastest of
+/// many, s.
 double
 fitSeconds(const py::object& points, const py::object& covariances, int repeats)
 {
