@@ -213,14 +213,16 @@ NeighborhoodSampler::Impl::patch(int seed,
   const SurfacePatchSettings settings{options.radius_m,
                                       options.jump_sigmas,
                                       strictness};
-  if (grid)
+  if (grid) {
+    const double sigma = depthSigma(seed);
     surfacePatch(*grid,
                  seed,
-                 jumpLimit(seed),
-                 depthSigma(seed),
+                 jumpLimit(seed, sigma),
+                 sigma,
                  settings,
                  scratch.patch,
                  indices);
+  }
   else if (noise->isOmnidirectional() || inCamera(seed).z() <= 0.0)
     pointsWithin(seed, options.radius_m, indices);
   else

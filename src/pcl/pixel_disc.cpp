@@ -29,7 +29,7 @@ connectedDisc(const PixelGrid& grid,
   const double slope = radius_m / grid.depth[static_cast<std::size_t>(seed)];
   const double column_radius = slope * camera.fx;
   const double row_radius = slope * camera.fy;
-  PixelRuns connected({grid.depth.data(), camera.width},
+  PixelRuns connected(grid.rows(),
                       {limit.along(1.0 / camera.fx), limit.along(1.0 / camera.fy)},
                       runs);
   const PixelRange rows = clippedRange(v0, row_radius, camera.height);

@@ -1,6 +1,7 @@
 /// \file The pixels of one surface within a disc around a seed.
 #pragma once
 
+#include "pixel_grid.h"
 #include "pixel_runs.h"
 
 #include <algorithm>

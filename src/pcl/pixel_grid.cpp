@@ -47,8 +47,11 @@ depthImage(const RangeCloud& cloud)
     const float z = pcl::isFinite(p) ? axis.dot(p.getVector3fMap() - centre) : 0.0F;
     return z > 0.0F ? z : std::numeric_limits<float>::quiet_NaN();
   };
-  std::vector<float> depth(cloud.points->size());
+  std::vector<float> depth;
+  depth.reserve(cloud.points->size() + kRowPadding);
+  depth.resize(cloud.points->size());
   std::transform(cloud.points->begin(), cloud.points->end(), depth.begin(), depthOf);
+  depth.resize(depth.size() + kRowPadding, std::numeric_limits<float>::quiet_NaN());
   return depth;
 }
 

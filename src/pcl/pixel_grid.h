@@ -1,6 +1,8 @@
 /// \file An organized cloud as its camera sees it.
 #pragma once
 
+#include "pixel_vectors.h"
+
 #include <holdfast/pcl/range_cloud.h>
 #include <holdfast/sensor/sensor.h>
 
@@ -9,25 +11,20 @@
 
 namespace holdfast {
 
-/// Pixels of one image row, or rows of a window: [begin, end).
-struct PixelRange {
-  int begin = 0;
-  int end = 0;
-};
-
-struct PixelWindow {
-  PixelRange columns;
-  PixelRange rows;
-};
-
 struct PixelGrid {
   Camera camera; ///< width and height are those of the cloud
   double margin_px = 0.0; ///< how far a point may lie from the pixel it was measured in
-  std::vector<float> depth; ///< z in the camera frame, m, row by row; NaN: no point
+  /// z in the camera frame, m, row by row, and kRowPadding more; NaN: no point.
+  std::vector<float> depth;
+
+  PixelRows rows() const
+  {
+    return {depth.data(), camera.width};
+  }
 
   const float* row(int v) const
   {
-    return depth.data() + static_cast<std::ptrdiff_t>(v) * camera.width;
+    return rows().row(v);
   }
 
   /// The pixels in which points of a ball may have been measured.

@@ -1,10 +1,47 @@
 #include "pixel_runs.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstring>
 
 namespace holdfast {
+namespace {
+
+int
+lowestBit(std::uint64_t word)
+{
+  return __builtin_ctzll(word);
+}
+
+/// The first bit of [begin, end) that is set after the words went through `changed`.
+template <typename Change>
+int
+firstBit(const std::uint64_t* words, int begin, int end, const Change& changed)
+{
+  while (begin < end) {
+    const int offset = begin % kWordBits;
+    const std::uint64_t left = changed(words[begin / kWordBits]) >> offset;
+    if (left != 0)
+      return std::min(begin + lowestBit(left), end);
+    begin += kWordBits - offset;
+  }
+  return end;
+}
+
+} // namespace
+
+int
+BitRow::firstSet(int begin, int end) const
+{
+  const auto same = [](std::uint64_t word) { return word; };
+  return first_column + firstBit(words, begin - first_column, end - first_column, same);
+}
+
+int
+BitRow::firstClear(int begin, int end) const
+{
+  const auto inverted = [](std::uint64_t word) { return ~word; };
+  return first_column +
+         firstBit(words, begin - first_column, end - first_column, inverted);
+}
 
 int
 PixelRuns::rootOf(int i)
@@ -14,28 +51,18 @@ PixelRuns::rootOf(int i)
   return i;
 }
 
-/// Whether some pixel of both runs, one above the other, continues the surface.
-bool
-PixelRuns::touch(const Run& a, const Run& b) const
-{
-  const float *row_a = values_.row(a.row), *row_b = values_.row(b.row);
-  const int end = std::min(a.end, b.end);
-  for (int u = std::max(a.begin, b.begin); u < end; ++u)
-    if (std::abs(row_a[u] - row_b[u]) < jump_.across_rows)
-      return true;
-  return false;
-}
-
-/// Joins the runs [above, here) of one row with those after them, of the next; both
-/// lists ascend.
+/// Joins the runs [above, here) of one row with those after them, of the next, where
+/// some pixel of both continues the surface; both lists ascend.
 void
-PixelRuns::joinRows(int above, int here)
+PixelRuns::joinRows(int above, int here, const BitRow& touches)
 {
   const int end = static_cast<int>(runs_.size());
   int a = above;
   int b = here;
   while (a < here && b < end) {
-    if (touch(runs_[a], runs_[b]))
+    const int first = std::max(runs_[a].begin, runs_[b].begin);
+    const int last = std::min(runs_[a].end, runs_[b].end);
+    if (first < last && touches.firstSet(first, last) < last)
       runs_[rootOf(b)].parent = rootOf(a);
     if (runs_[a].end < runs_[b].end)
       ++a;
@@ -44,58 +71,33 @@ PixelRuns::joinRows(int above, int here)
   }
 }
 
-namespace {
-
-/// Whether a pixel goes on where the one before is; none does after the last. Without
-/// branches, so that several pixels are looked at at once; comparisons with NaN are
-/// false: an invalid pixel ends a run. \return true when all go on.
-bool
-compareNeighbors(const float* __restrict value,
-                 int width,
-                 float jump,
-                 char* __restrict continues)
-{
-  char all = 1;
-  for (int i = 1; i < width; ++i) {
-    const char goes_on = std::abs(value[i] - value[i - 1]) < jump ? 1 : 0;
-    continues[i] = goes_on;
-    all = static_cast<char>(all & goes_on);
-  }
-  continues[width] = 0;
-  return all != 0;
-}
-
-} // namespace
-
 void
 PixelRuns::addRow(int row, PixelRange columns)
 {
-  const float* value = values_.row(row);
   const int here = static_cast<int>(runs_.size());
-  const int width = std::max(columns.end - columns.begin, 0);
-  continues_.resize(static_cast<std::size_t>(width) + 1);
-  char* const continues = continues_.data();
-  const float* const first = value + columns.begin;
-  const bool is_one = compareNeighbors(first, width, jump_.in_row, continues);
-  for (int begin = 0; begin < width;) {
-    if (std::isnan(first[begin])) { // it goes on nowhere, and is no run
-      ++begin;
-      continue;
-    }
-    int end = width;
-    if (!is_one) {
-      const auto left = static_cast<std::size_t>(width - begin);
-      const void* const stop = std::memchr(continues + begin + 1, 0, left);
-      end = static_cast<int>(static_cast<const char*>(stop) - continues);
-    }
-    runs_.push_back({row,
-                     columns.begin + begin,
-                     columns.begin + end,
-                     static_cast<int>(runs_.size())});
-    begin = end;
+  const int count = std::max(columns.end - columns.begin, 0);
+  const auto words = static_cast<std::size_t>((count + kWordBits - 1) / kWordBits);
+  if (bits_.size() < 3 * words)
+    bits_.resize(3 * words);
+  std::uint64_t* const first = bits_.data();
+  const RowBits bits{first, first + words, first + 2 * words};
+  const float* const value = values_.row(row) + columns.begin;
+  compareNeighbors(value,
+                   is_first_ ? value : value - values_.stride,
+                   count,
+                   jump_,
+                   bits);
+  const BitRow valid{bits.valid, columns.begin};
+  const BitRow continues{bits.continues, columns.begin};
+  int begin = valid.firstSet(columns.begin, columns.end);
+  while (begin < columns.end) {
+    const int end = continues.firstClear(begin, columns.end - 1) + 1;
+    runs_.push_back({row, begin, end, static_cast<int>(runs_.size())});
+    begin = valid.firstSet(end, columns.end);
   }
-  joinRows(above_, here);
+  joinRows(above_, here, {bits.touches, columns.begin});
   above_ = here;
+  is_first_ = false;
 }
 
 void

@@ -2,24 +2,13 @@
 /// runs are joined where rows meet.
 #pragma once
 
-#include "pixel_grid.h"
+#include "pixel_vectors.h"
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 namespace holdfast {
-
-/// Values over the pixels of a window; row(v)[u] is that of pixel (u, v). Pixels that
-/// are NaN belong to nothing.
-struct PixelRows {
-  const float* first; ///< row(v) = first + v stride; only rows of the window are read
-  std::ptrdiff_t stride;
-
-  const float* row(int v) const
-  {
-    return first + v * stride;
-  }
-};
 
 /// Connected pixels [begin, end) of one row; runs that touch form a tree by `parent`.
 struct Run {
@@ -29,23 +18,27 @@ struct Run {
   int parent;
 };
 
+/// Bits of one row, the first of which is of that column.
+struct BitRow {
+  const std::uint64_t* words;
+  int first_column;
+
+  /// The first column of [begin, end) whose bit is set, or clear; `end` without one.
+  int firstSet(int begin, int end) const;
+  int firstClear(int begin, int end) const;
+};
+
 /// Kept between searches: no allocation once it has seen the largest.
 struct RunMemory {
   std::vector<Run> runs;
-  std::vector<char> continues; ///< of a row
-};
-
-/// Largest difference of values between neighbours that belong together.
-struct PixelJump {
-  float in_row;
-  float across_rows;
+  std::vector<std::uint64_t> bits; ///< of a row
 };
 
 /// Collects the runs of rows from the first to the last, then the component of a seed.
 class PixelRuns {
 public:
   PixelRuns(const PixelRows& values, const PixelJump& jump, RunMemory& memory)
-  : values_(values), jump_(jump), runs_(memory.runs), continues_(memory.continues)
+  : values_(values), jump_(jump), runs_(memory.runs), bits_(memory.bits)
   {
     runs_.clear();
   }
@@ -59,13 +52,13 @@ public:
 
 private:
   int rootOf(int i);
-  bool touch(const Run& a, const Run& b) const;
-  void joinRows(int above, int here);
+  void joinRows(int above, int here, const BitRow& touches);
 
   PixelRows values_;
   PixelJump jump_;
   std::vector<Run>& runs_;
-  std::vector<char>& continues_; ///< whether pixels go on where those before them are
+  std::vector<std::uint64_t>& bits_;
+  bool is_first_ = true;
   int above_ = 0; ///< where the runs of the last row begin
 };
 

@@ -1,44 +1,38 @@
 #include "reference_surface.h"
 
+#include "pixel_vectors.h"
+
 #include <Eigen/Cholesky>
 
 #include <cmath>
-#include <limits>
-#include <utility>
 
 namespace holdfast {
 namespace {
 
-// Sums of products of the monomials 1 s t ss st tt of the samples, and of them with the
-// inverse depths less the first, so that squares keep their digits; in units in which
-// the samples spread over about one.
+// The normal equations of the first n of the monomials 1 s t ss st tt, and the
+// right-hand side as their last column; slopes in units in which the samples spread
+// over about one, inverse depths less the first, so that squares keep their digits.
 template <int n>
-Eigen::Matrix<double, n + 1, n + 1>
-sumProducts(const RaySamples& samples, double scale)
+Eigen::Matrix<double, n, n + 1>
+normalEquations(const SampleSums& sums)
 {
-  // Column by column: Eigen's product of matrices this narrow costs twice as much.
-  Eigen::Matrix<double, RaySamples::kMost, n + 1> rows;
-  const int count = samples.size;
-  for (int i = 0; i < count; ++i) {
-    const double s = samples.s[i] / scale, t = samples.t[i] / scale;
-    const double monomials[6] = {1.0, s, t, s * s, s * t, t * t};
-    for (int j = 0; j < n; ++j)
-      rows(i, j) = monomials[j];
-    rows(i, n) = samples.inverse_depth[i] - samples.inverse_depth[0];
+  constexpr int kOfS[6] = {0, 1, 0, 2, 1, 0}, kOfT[6] = {0, 0, 1, 0, 1, 2};
+  Eigen::Matrix<double, n, n + 1> equations;
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) {
+      const int power = monomialIndex(kOfS[i] + kOfS[j], kOfT[i] + kOfT[j]);
+      equations(i, j) = sums.powers[static_cast<std::size_t>(power)];
+    }
+    equations(i, n) = sums.with_rho[static_cast<std::size_t>(i)];
   }
-  const auto used = rows.topRows(count);
-  Eigen::Matrix<double, n + 1, n + 1> sums;
-  for (int i = 0; i <= n; ++i)
-    for (int j = i; j <= n; ++j)
-      sums(i, j) = sums(j, i) = used.col(i).dot(used.col(j));
-  return sums;
+  return equations;
 }
 
 // Least squares for the first n of the monomials. What the coefficients explain of the
 // sum of squares is in `explained`.
-template <int n, int size>
+template <int n>
 bool
-solve(const Eigen::Matrix<double, size, size>& sums,
+solve(const SampleSums& sums,
       const RaySamples& samples,
       double scale,
       std::array<double, 6>& h,
@@ -46,9 +40,9 @@ solve(const Eigen::Matrix<double, size, size>& sums,
 {
   using Matrix = Eigen::Matrix<double, n, n>;
   using Vector = Eigen::Matrix<double, n, 1>;
-  const Matrix A = sums.template topLeftCorner<n, n>();
-  const Vector b = sums.template topRightCorner<n, 1>();
-  const Eigen::LLT<Matrix> cholesky(A);
+  const Eigen::Matrix<double, n, n + 1> equations = normalEquations<n>(sums);
+  const Vector b = equations.col(n);
+  const Eigen::LLT<Matrix> cholesky(equations.template leftCols<n>());
   // Of points on a line or a conic, rounding leaves pivots of some 1e-16.
   constexpr double kSmallestPivot = 1e-6;
   if (cholesky.info() != Eigen::Success ||
@@ -88,7 +82,7 @@ ReferenceSurface::fitPlane(const RaySamples& samples)
   double explained = 0.0;
   std::array<double, 6> h{};
   return samples.size >= kFew && scale > 0.0 &&
-         solve<3>(sumProducts<3>(samples, scale), samples, scale, h, explained) &&
+         solve<3>(sumSamples(samples, 1, scale), samples, scale, h, explained) &&
          take(h);
 }
 
@@ -107,7 +101,7 @@ ReferenceSurface::fitQuadric(const RaySamples& samples, double sigma)
   double by_plane = 0.0, by_quadric = 0.0;
   if (!(scale > 0.0))
     return false;
-  const auto sums = sumProducts<6>(samples, scale);
+  const SampleSums sums = sumSamples(samples, 2, scale);
   if (!solve<3>(sums, samples, scale, plane, by_plane))
     return false;
   const bool bends = solve<6>(sums, samples, scale, quadric, by_quadric) &&
@@ -139,37 +133,23 @@ ReferenceSurface::normal() const
 }
 
 LateralDisc::LateralDisc(const ReferenceSurface& surface, double radius_m)
-: surface_(surface)
-, ray_(surface.seedRay())
-, point_(surface.point())
-, normal_(surface.normal())
-, squared_radius_(radius_m * radius_m)
+: surface_(surface), ray_(surface.seedRay())
 {
+  const Eigen::Vector3d point = surface.point(), normal = surface.normal();
+  const double rr = radius_m * radius_m;
+  excess_ = {{point.x(), point.y(), point.z()},
+             {normal.x(), normal.y(), normal.z()},
+             rr};
   // On the tangent plane rho = h0 + h1 s + h2 t, and the points are at (g t + d s) /
   // rho from the seed's.
   const double h0 = surface.coefficients()[0], h1 = surface.coefficients()[1];
   const double h2 = surface.coefficients()[2];
-  const Eigen::Vector3d g = Eigen::Vector3d::UnitY() - h2 * point_;
-  const Eigen::Vector3d d = Eigen::Vector3d::UnitX() - h1 * point_;
-  const double rr = squared_radius_;
-  A_ = d.squaredNorm() - rr * h1 * h1;
-  B_ = {-rr * h0 * h1, g.dot(d) - rr * h2 * h1};
-  C_ = {-rr * h0 * h0, -2.0 * rr * h0 * h2, g.squaredNorm() - rr * h2 * h2};
-}
-
-std::pair<double, double>
-LateralDisc::chord(double t) const
-{
-  constexpr double kEndless = std::numeric_limits<double>::infinity();
-  if (!(A_ > 0.0))
-    return {-kEndless, kEndless};
-  const double B = B_[0] + B_[1] * t;
-  const double C = C_[0] + t * (C_[1] + t * C_[2]);
-  const double discriminant = B * B - A_ * C;
-  if (discriminant < 0.0)
-    return {kEndless, -kEndless};
-  const double root = std::sqrt(discriminant);
-  return {(-B - root) / A_, (-B + root) / A_};
+  const Eigen::Vector3d g = Eigen::Vector3d::UnitY() - h2 * point;
+  const Eigen::Vector3d d = Eigen::Vector3d::UnitX() - h1 * point;
+  on_tangent_plane_ = {
+      d.squaredNorm() - rr * h1 * h1,
+      {-rr * h0 * h1, g.dot(d) - rr * h2 * h1},
+      {-rr * h0 * h0, -2.0 * rr * h0 * h2, g.squaredNorm() - rr * h2 * h2}};
 }
 
 } // namespace holdfast

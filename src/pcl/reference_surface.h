@@ -9,7 +9,6 @@
 #include <Eigen/Core>
 
 #include <array>
-#include <utility>
 
 namespace holdfast {
 
@@ -79,6 +78,23 @@ private:
   std::array<double, 6> h_{};
 };
 
+/// Squared distance along the tangent plane from a point of it, less a squared radius,
+/// times rho^2, of the point at z = 1 / rho of the ray (x, y, 1).
+template <typename Scalar>
+struct LateralExcess {
+  std::array<Scalar, 3> point, normal;
+  Scalar squared_radius;
+
+  Scalar operator()(Scalar x, Scalar y, Scalar rho) const
+  {
+    // rho (P - P0).
+    const Scalar gx = x - rho * point[0], gy = y - rho * point[1];
+    const Scalar gz = Scalar(1) - rho * point[2];
+    const Scalar off = normal[0] * gx + normal[1] * gy + normal[2] * gz;
+    return gx * gx + gy * gy + gz * gz - off * off - squared_radius * rho * rho;
+  }
+};
+
 /// Tells whether a ray meets the surface within a distance from where the seed's does,
 /// measured along the tangent plane there.
 class LateralDisc {
@@ -95,28 +111,39 @@ public:
   /// rho.
   double excess(double s, double t, double rho) const
   {
-    // rho (P - P0) of the point P = (x, y, 1) / rho.
-    const Eigen::Vector3d g =
-        Eigen::Vector3d(ray_.x() + s, ray_.y() + t, 1.0) - rho * point_;
-    const double off = normal_.dot(g);
-    return g.squaredNorm() - off * off - squared_radius_ * rho * rho;
+    return excess_(ray_.x() + s, ray_.y() + t, rho);
   }
 
-  /// Slopes s between which rays of this t meet the tangent plane within the radius;
-  /// first > second when none does. Endless where the plane is seen edge-on. Where the
-  /// surface is a plane, no others are within the radius.
-  std::pair<double, double> chord(double t) const;
+  /// Of the squared distance along the tangent plane, less the squared radius, times
+  /// 1/z^2: A s^2 + 2 (B . (1, t)) s + C . (1, t, t^2). Its roots bound the rays that
+  /// meet the tangent plane within the radius, and where the surface is a plane no
+  /// others are within it; with A not positive, the plane is seen edge-on.
+  struct OnTangentPlane {
+    double A;
+    std::array<double, 2> B;
+    std::array<double, 3> C;
+  };
+
+  const OnTangentPlane& onTangentPlane() const
+  {
+    return on_tangent_plane_;
+  }
+
+  const ReferenceSurface& surface() const
+  {
+    return surface_;
+  }
+
+  const LateralExcess<double>& lateralExcess() const
+  {
+    return excess_;
+  }
 
 private:
   ReferenceSurface surface_;
   Eigen::Vector2d ray_;
-  Eigen::Vector3d point_, normal_;
-  double squared_radius_;
-  /// Of the squared distance along the tangent plane, less the squared radius, times
-  /// 1/z^2, as A s^2 + 2 (B . (1, t)) s + C . (1, t, t^2).
-  double A_;
-  std::array<double, 2> B_;
-  std::array<double, 3> C_;
+  LateralExcess<double> excess_;
+  OnTangentPlane on_tangent_plane_;
 };
 
 } // namespace holdfast

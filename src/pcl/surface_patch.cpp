@@ -1,8 +1,9 @@
 #include "surface_patch.h"
 
+#include "pixel_vectors.h"
+
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace holdfast {
 namespace {
@@ -51,95 +52,6 @@ stepOver(std::size_t size)
   return std::max<std::size_t>(1, (size + kMost - 1) / kMost);
 }
 
-// LateralDisc::excess() along a row of pixels, in single precision.
-class RowTest {
-public:
-  RowTest(const ReferenceSurface& surface, double radius_m)
-  : h_(surface.coefficients())
-  , is_plane_(surface.isPlane())
-  , seed_ray_(surface.seedRay().cast<float>())
-  , point_(surface.point().cast<float>())
-  , normal_(surface.normal().cast<float>())
-  , squared_radius_(static_cast<float>(radius_m * radius_m))
-  {}
-
-  /// \param t slope of the row's rays from that of the seed's
-  void setRow(double t)
-  {
-    // 1/z = rho[0] + rho[1] s + rho[2] s^2.
-    rho_ = {static_cast<float>(h_[0] + t * (h_[2] + h_[5] * t)),
-            static_cast<float>(h_[1] + h_[4] * t),
-            static_cast<float>(h_[3])};
-    ray_ = seed_ray_ + Eigen::Vector2f(0.0F, static_cast<float>(t));
-  }
-
-  /// Departures of n pixels of the row from slope `s` on; NaN where they are no part of
-  /// the surface.
-  void run(const float* depth, float s, float pitch, float gate, int n, float* out)
-      const
-  {
-    if (is_plane_)
-      runOnPlane(depth, s, pitch, gate, n, out);
-    else
-      runOnQuadric(depth, s, pitch, gate, n, out);
-  }
-
-private:
-  // Without branches and with local copies, so that several pixels are looked at at
-  // once.
-  void runOnPlane(const float* __restrict depth,
-                  float s,
-                  float pitch,
-                  float gate,
-                  int n,
-                  float* __restrict out) const
-  {
-    constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-    const float first = rho_[0] + rho_[1] * s, step = rho_[1] * pitch;
-    for (int i = 0; i < n; ++i) {
-      const float rho = first + step * static_cast<float>(i);
-      const float departure = 1.0F / depth[i] - rho;
-      const bool belongs = (std::abs(departure) <= gate) & (rho > 0.0F);
-      out[i] = belongs ? departure : kNone;
-    }
-  }
-
-  // The same where the surface bends, and not all that the chord holds is within.
-  void runOnQuadric(const float* __restrict depth,
-                    float s,
-                    float pitch,
-                    float gate,
-                    int n,
-                    float* __restrict out) const
-  {
-    constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-    const auto [h0, h1, h2] = rho_;
-    const float x = ray_.x() + s, y = ray_.y();
-    const float px = point_.x(), py = point_.y(), pz = point_.z();
-    const float nx = normal_.x(), ny = normal_.y(), nz = normal_.z();
-    const float rr = squared_radius_;
-    for (int i = 0; i < n; ++i) {
-      const float along = pitch * static_cast<float>(i);
-      const float slope = s + along;
-      const float rho = h0 + slope * (h1 + slope * h2);
-      const float gx = x + along - rho * px, gy = y - rho * py, gz = 1.0F - rho * pz;
-      const float off = nx * gx + ny * gy + nz * gz;
-      const float excess = gx * gx + gy * gy + gz * gz - off * off - rr * rho * rho;
-      const float departure = 1.0F / depth[i] - rho;
-      const bool belongs =
-          (excess <= 0.0F) & (std::abs(departure) <= gate) & (rho > 0.0F);
-      out[i] = belongs ? departure : kNone;
-    }
-  }
-
-  std::array<double, 6> h_;
-  bool is_plane_;
-  std::array<float, 3> rho_{};
-  Eigen::Vector2f seed_ray_, ray_;
-  Eigen::Vector3f point_, normal_;
-  float squared_radius_;
-};
-
 class Search {
 public:
   Search(const PixelGrid& grid,
@@ -176,33 +88,38 @@ public:
   // The connected pixels within a radius on the surface found so far.
   void collect(double radius_m, double departure_m, std::vector<int>& indices)
   {
-    const Camera& camera = grid_.camera;
     // Beyond the disc on the tangent plane, for the disc on the curved surface.
     constexpr double kMargin = 1.2;
-    RowTest test(surface_, radius_m);
-    const LateralDisc about(surface_, (surface_.isPlane() ? 1.0 : kMargin) * radius_m);
+    const LateralDisc disc(surface_, radius_m);
+    const LateralDisc about =
+        surface_.isPlane() ? disc : LateralDisc(surface_, kMargin * radius_m);
     const PixelWindow window = grid_.ballWindow(surface_.point(), kMargin * radius_m);
     const int columns = window.columns.end - window.columns.begin;
     const int rows = window.rows.end - window.rows.begin;
     indices.clear();
     if (columns <= 0 || rows <= 0)
       return;
-    scratch_.window.resize(static_cast<std::size_t>(columns) *
-                           static_cast<std::size_t>(rows));
+    const auto size =
+        static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
+    scratch_.window.resize(size + kRowPadding);
+    scratch_.chords.resize(static_cast<std::size_t>(rows));
+    PixelRange* const chords = scratch_.chords.data();
     float* const first = scratch_.window.data() - window.columns.begin -
                          static_cast<std::ptrdiff_t>(window.rows.begin) * columns;
+    const SeedPixel seed{u0_, v0_, grid_.camera.fx, grid_.camera.fy};
+    discChords(about, seed, window, chords);
+    surfaceDepartures(disc,
+                      seed,
+                      grid_.rows(),
+                      window.rows,
+                      chords,
+                      static_cast<float>(departure_m / (depth_ * depth_)),
+                      first,
+                      columns);
     PixelRuns connected({first, columns}, jump(), scratch_.runs);
-    const auto gate = static_cast<float>(departure_m / (depth_ * depth_));
-    for (int v = window.rows.begin; v < window.rows.end; ++v) {
-      const PixelRange range = chord(about, v, window.columns);
-      writeDepartures(test,
-                      v,
-                      range,
-                      gate,
-                      first + static_cast<std::ptrdiff_t>(v) * columns);
-      connected.addRow(v, range);
-    }
-    connected.component(u0_, v0_, camera.width, indices);
+    for (int v = window.rows.begin; v < window.rows.end; ++v)
+      connected.addRow(v, chords[v - window.rows.begin]);
+    connected.component(u0_, v0_, grid_.camera.width, indices);
   }
 
 private:
@@ -211,6 +128,7 @@ private:
   {
     const Camera& camera = grid_.camera;
     const auto step = stepOver(pixels.size());
+    const double per_column = 1.0 / camera.fx, per_row = 1.0 / camera.fy;
     RaySamples samples;
     int row = 0, row_begin = 0;
     for (std::size_t i = step / 2; i < pixels.size(); i += step) {
@@ -218,8 +136,8 @@ private:
         row = pixels[i] / camera.width;
         row_begin = row * camera.width;
       }
-      samples.add((pixels[i] - row_begin - u0_) / camera.fx,
-                  (row - v0_) / camera.fy,
+      samples.add((pixels[i] - row_begin - u0_) * per_column,
+                  (row - v0_) * per_row,
                   1.0 / grid_.depth[static_cast<std::size_t>(pixels[i])]);
     }
     return samples;
@@ -231,39 +149,6 @@ private:
     const double slope = kSlope / depth_; // of 1/z, per slope of the ray
     return {static_cast<float>(std::max(noise, slope / grid_.camera.fx)),
             static_cast<float>(std::max(noise, slope / grid_.camera.fy))};
-  }
-
-  PixelRange chord(const LateralDisc& disc, int v, const PixelRange& columns) const
-  {
-    const auto [low, high] = disc.chord((v - v0_) / grid_.camera.fy);
-    if (!(low <= high))
-      return {columns.begin, columns.begin};
-    const double first = low * grid_.camera.fx + u0_;
-    const double last = high * grid_.camera.fx + u0_;
-    const int begin = static_cast<int>(
-        std::ceil(std::clamp(first, double(columns.begin), double(columns.end))));
-    const int end = static_cast<int>(std::floor(
-                        std::clamp(last, columns.begin - 1.0, columns.end - 1.0))) +
-                    1;
-    return {begin, std::max(begin, end)};
-  }
-
-  // By how much 1/z of the points leaves the surface; NaN where they are no part of it.
-  void writeDepartures(RowTest& test,
-                       int v,
-                       const PixelRange& range,
-                       float gate,
-                       float* out) const
-  {
-    const float t = static_cast<float>((v - v0_) / grid_.camera.fy);
-    const float pitch = static_cast<float>(1.0 / grid_.camera.fx);
-    test.setRow(t);
-    test.run(grid_.row(v) + range.begin,
-             pitch * static_cast<float>(range.begin - u0_),
-             pitch,
-             gate,
-             range.end - range.begin,
-             out + range.begin);
   }
 
   const PixelGrid& grid_;

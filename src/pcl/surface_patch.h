@@ -28,6 +28,7 @@ struct SurfacePatchScratch {
   std::vector<int> pixels;
   std::vector<int> members;
   std::vector<float> window;
+  std::vector<PixelRange> chords; ///< of the rows of the window
 };
 
 /// Replaces `indices` by the pixels whose rays meet the seed's surface within the
