@@ -9,6 +9,8 @@ if(HOLDFAST_QUICKSTART)
       WITH_HDF5 WITH_OPENNI2 WITH_VIEWER WITH_PYTHON)
     set(HOLDFAST_${part} OFF)
   endforeach()
+  # Several sources at a time: half of what they take is the headers that they share.
+  set(CMAKE_UNITY_BUILD ON)
 endif()
 
 set(quickstart_without
