@@ -1,6 +1,7 @@
 # What a first look does without, and what samples/quickstart.sh therefore does not
 # compile: all but `holdfast fit` and `holdfast info`, the noise calibration, simulator,
-# maps, contacts and evaluation, two covariance modes, and the library holdfast_pcl.
+# maps, contacts and evaluation, two covariance modes, vectors other than AVX2 and the
+# plainest, and the library holdfast_pcl.
 
 # Plain variables go before the options of the same names, and leave a later build in
 # the same folder as it would have been.
@@ -11,6 +12,7 @@ if(HOLDFAST_QUICKSTART)
   endforeach()
   # Several sources at a time: half of what they take is the headers that they share.
   set(CMAKE_UNITY_BUILD ON)
+  set(CMAKE_UNITY_BUILD_BATCH_SIZE 16)
 endif()
 
 set(quickstart_without

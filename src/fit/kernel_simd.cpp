@@ -8,11 +8,8 @@
 
 #ifdef HOLDFAST_HAVE_HIGHWAY
 
-#undef HWY_DISABLED_TARGETS
-// The steps between SSSE3, AVX2 and AVX-512 gain nothing here; scalable vectors cannot
-// be members of a class.
-#define HWY_DISABLED_TARGETS \
-  (HWY_SSE4 | HWY_AVX3_DL | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
+#include "fit/vector_targets.inl"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "fit/kernel_simd.cpp"
 #include <hwy/foreach_target.h>

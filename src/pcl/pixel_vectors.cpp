@@ -8,10 +8,8 @@
 
 #ifdef HOLDFAST_HAVE_HIGHWAY
 
-// As in fit/kernel_simd.cpp.
-#undef HWY_DISABLED_TARGETS
-#define HWY_DISABLED_TARGETS \
-  (HWY_SSE4 | HWY_AVX3_DL | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
+#include "fit/vector_targets.inl"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "pcl/pixel_vectors.cpp"
 #include <hwy/foreach_target.h>

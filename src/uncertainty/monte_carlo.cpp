@@ -15,7 +15,7 @@ namespace {
 
 // Noise-free points and the noise to draw: errors of their own, N(0, S S^T) with the
 // roots S, and those they share, e r_i with e = L n.
-struct Model {
+struct ErrorModel {
   Eigen::Vector3d origin, viewpoint;
   std::vector<Eigen::Vector3d> points;
   std::vector<Eigen::Matrix3d> covariances;
@@ -53,7 +53,7 @@ sharedRoot(const NoisePattern& pattern, const std::vector<Eigen::Vector2d>& pixe
 }
 
 void
-addShared(const PointBatch& valid, Model& model)
+addShared(const PointBatch& valid, ErrorModel& model)
 {
   const double variance = model.pattern->pattern().variance();
   for (int i = 0; i < valid.size(); ++i) {
@@ -69,12 +69,12 @@ addShared(const PointBatch& valid, Model& model)
   model.shared_root = sharedRoot(model.pattern->pattern(), model.pixels);
 }
 
-Model
+ErrorModel
 modelOf(const PointBatch& batch)
 {
   PointBatch valid;
   valid.clear(batch.origin());
-  Model model;
+  ErrorModel model;
   model.pattern = batch.sharedPattern();
   valid.setPattern(model.pattern);
   for (int i = 0; i < batch.size(); ++i) {
@@ -96,7 +96,7 @@ modelOf(const PointBatch& batch)
 }
 
 void
-drawShared(const Model& model, std::mt19937_64& generator, PointBatch& batch)
+drawShared(const ErrorModel& model, std::mt19937_64& generator, PointBatch& batch)
 {
   std::normal_distribution<double> normal;
   Eigen::VectorXd n(batch.size());
@@ -116,7 +116,7 @@ drawShared(const Model& model, std::mt19937_64& generator, PointBatch& batch)
 }
 
 void
-drawPoints(const Model& model, std::mt19937_64& generator, PointBatch& batch)
+drawPoints(const ErrorModel& model, std::mt19937_64& generator, PointBatch& batch)
 {
   batch.clear(model.origin, model.viewpoint);
   batch.setPattern(model.pattern);
@@ -171,7 +171,7 @@ monteCarloCovariance(const Patch& reference,
   if (monte_carlo.trials < 1)
     throw std::invalid_argument("a Monte Carlo run needs one trial or more");
   const PatchFitter fitter(withType(options, reference.type));
-  const Model model = modelOf(batch);
+  const ErrorModel model = modelOf(batch);
   const PatchState about = toState(reference, options.containment);
   std::vector<std::optional<Trial>> trials(
       static_cast<std::size_t>(monte_carlo.trials));
