@@ -95,7 +95,7 @@ def test_everything_has_help():
                     assert getattr(thing, member).__doc__, f"{name}.{member}"
 
 
-@pytest.mark.parametrize("name", ["fit", "fit_many", "extract", "simulate", "contact_risk", "rank_footholds"])
+@pytest.mark.parametrize("name", ["fit", "fit_many", "extract", "simulate", "contact_risk", "rank_footholds", "risk_grid"])
 def test_help_teaches(name):
     function = getattr(holdfast, name)
     parameters = inspect.signature(function).parameters

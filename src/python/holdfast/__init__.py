@@ -23,6 +23,7 @@ from ._core import (
     Patch,
     Patches,
     PatchMap,
+    RiskGrid,
     Sensor,
     Simulation,
     __version__,
@@ -32,6 +33,7 @@ from ._core import (
     fit,
     fit_many,
     rank_footholds,
+    risk_grid,
     scene_names,
     simulate,
 )
@@ -47,6 +49,7 @@ __all__ = [
     "PatchMap",
     "Patches",
     "RISK_ASSUMPTIONS",
+    "RiskGrid",
     "Sensor",
     "Simulation",
     "__version__",
@@ -56,6 +59,7 @@ __all__ = [
     "fit",
     "fit_many",
     "rank_footholds",
+    "risk_grid",
     "scene_names",
     "simulate",
 ]
@@ -69,6 +73,7 @@ for _thing in (
     Patch,
     Patches,
     PatchMap,
+    RiskGrid,
     Sensor,
     Simulation,
 ):
