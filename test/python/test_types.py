@@ -89,6 +89,8 @@ def test_everything_has_help():
     for name in holdfast.__all__:
         thing = getattr(holdfast, name)
         assert thing.__doc__, name
+        if callable(thing):
+            assert thing.__module__ == "holdfast", name
         if inspect.isclass(thing):
             for member, value in vars(thing).items():
                 if not member.startswith("_"):

@@ -65,17 +65,7 @@ __all__ = [
 ]
 
 # What users see, in messages and in help().
-for _thing in (
-    ContactRisk,
-    ContactRisks,
-    Foot,
-    FootholdRanking,
-    Patch,
-    Patches,
-    PatchMap,
-    RiskGrid,
-    Sensor,
-    Simulation,
-):
-    _thing.__module__ = __name__
-del _thing
+for _name in __all__:
+    if callable(globals()[_name]):
+        globals()[_name].__module__ = __name__
+del _name
