@@ -32,6 +32,15 @@ def version() -> str:
     return found.group(1)
 
 
+def dependencies() -> list[str]:
+    """Before 2.12 pybind11 reads arrays of numpy 2 wrongly, so the module refuses it."""
+    try:
+        from pybind11 import version_info
+    except ImportError:  # the build folder's own is unknown
+        version_info = (0, 0)
+    return ["numpy>=1.20" if tuple(version_info[:2]) >= (2, 12) else "numpy>=1.20,<2"]
+
+
 def configure(folder: Path) -> None:
     command = ["cmake", "-S", str(ROOT), "-B", str(folder)]
     command += ["-DCMAKE_BUILD_TYPE=Release", "-DHOLDFAST_WITH_PYTHON=ON"]
@@ -62,6 +71,7 @@ class CMakeBuild(build_ext):
 
 setup(
     version=version(),
+    install_requires=dependencies(),
     ext_modules=[Extension("holdfast._core", sources=[])],
     cmdclass={"build_ext": CMakeBuild},
 )

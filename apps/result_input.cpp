@@ -1,5 +1,7 @@
 #include "result_input.h"
 
+#include "risk_result.h"
+
 #include <holdfast/pcl/intrinsics.h>
 
 #include <pcl/common/point_tests.h>
@@ -65,7 +67,7 @@ readResultText(const std::string& path)
 PatchReport
 parseResult(const std::string& path, const std::string& text)
 {
-  if (text.find("\"footholds\":") != std::string::npos)
+  if (isRiskResult(text))
     throw std::runtime_error(path + ": is a result of 'holdfast risk', which 'holdfast "
                                     "render --color risk' draws");
   if (fs::path(path).extension() == ".map")

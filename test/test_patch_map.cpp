@@ -1,5 +1,6 @@
 // The map of patches: what becomes of measurements, and that nothing else decides.
 #include "support/random_patch.h"
+#include "support/risk_map.h"
 #include "support/spot.h"
 
 #include <holdfast/fusion/patch_map.h>
@@ -36,24 +37,14 @@ jetCovariance()
 Measurement
 measurementAt(std::uint64_t id, const Eigen::Vector3d& place, Random* noise = nullptr)
 {
-  Measurement m;
-  m.id = id;
-  m.anchor = {frameFromZ(-Eigen::Vector3d::UnitZ()), place};
+  Measurement m =
+      test::groundMeasurement(id,
+                              {frameFromZ(-Eigen::Vector3d::UnitZ()), place},
+                              kRadius);
   m.jet.white = jetCovariance();
   if (noise)
     for (int i = 0; i < 6; ++i)
       m.jet.value[i] = jetSigmas()[i] * noise->normal();
-  m.radius_m = kRadius;
-  m.points = 140;
-  const double moment = kRadius * kRadius / 4.0;
-  m.moments = {moment, 0.0, moment};
-  m.moments_covariance = 1e-12 * Eigen::Matrix3d::Identity();
-  m.design.by_third = thirdToJetOfDisc(kRadius);
-  for (int row = 0; row < SupportGrid::kCells; ++row)
-    for (int column = 0; column < SupportGrid::kCells; ++column)
-      if (std::hypot(SupportGrid::middle(row), SupportGrid::middle(column)) <= 1.0)
-        m.support.set(column, row);
-  m.chi2 = m.chi2_expected = 134.0;
   return m;
 }
 

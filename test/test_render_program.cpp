@@ -2,8 +2,7 @@
 #include <holdfast/io/cloud_io.h>
 #include <holdfast/io/patch_io.h>
 
-#include "support/run_program.h"
-#include "support/small_clouds.h"
+#include "support/result_program.h"
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -62,14 +61,9 @@ readPicture(const std::string& path)
   return picture;
 }
 
-class RenderProgram : public testing::Test {
+class RenderProgram : public test::ResultProgram {
 protected:
-  RenderProgram()
-  : folder_(test::freshFolder(
-        std::string("render_") +
-        testing::UnitTest::GetInstance()->current_test_info()->name()))
-  , picture_(folder_ + "/picture.png")
-  {}
+  RenderProgram() : ResultProgram("render", "picture.png") {}
 
   /// Fits the sample cloud. \return the result file.
   std::string fitRocks() const
@@ -87,47 +81,12 @@ protected:
     return folder_ + "/rocks.patches.json";
   }
 
-  /// Fits a bowl whose cloud lies beside its result and is named without a folder.
-  std::string fitBowl(const std::string& name) const
-  {
-    saveCloud(folder_ + "/" + name + ".pcd",
-              test::bowlCloud(40, 30, test::tiltedPose(), true));
-    const test::ProgramRun run = test::runProgram(
-        folder_,
-        {"fit", folder_ + "/" + name + ".pcd", "-o", folder_, "--quiet"});
-    EXPECT_EQ(run.exit_code, 0) << run.err;
-    const std::string result = folder_ + "/" + name + ".patches.json";
-    Json json = Json::parse(test::readFile(result));
-    json["cloud"] = name + ".pcd";
-    test::writeFile(result, json.dump());
-    return result;
-  }
-
   Picture render(Names arguments) const
   {
-    arguments.insert(arguments.begin(), "render");
-    arguments.insert(arguments.end(), {"-o", picture_});
-    const test::ProgramRun run = test::runProgram(folder_, arguments);
-    EXPECT_EQ(run.exit_code, 0) << run.err;
-    EXPECT_EQ(run.out, "");
-    EXPECT_EQ(run.err, "");
-    return readPicture(picture_);
+    arguments.insert(arguments.end(), {"-o", output_});
+    EXPECT_EQ(runWell(arguments), "");
+    return readPicture(output_);
   }
-
-  /// Expects this exit code, one line that says `what`, and no picture.
-  void expectError(int exit_code, Names arguments, const std::string& what) const
-  {
-    arguments.insert(arguments.begin(), "render");
-    arguments.insert(arguments.end(), {"-o", picture_});
-    const test::ProgramRun run = test::runProgram(folder_, arguments);
-    EXPECT_EQ(run.exit_code, exit_code) << what << '\n' << run.err;
-    EXPECT_EQ(run.errorLines(), 1) << run.err;
-    EXPECT_NE(run.err.find(what), std::string::npos) << run.err;
-    EXPECT_FALSE(std::filesystem::exists(picture_)) << what;
-  }
-
-  std::string folder_;
-  std::string picture_;
 };
 
 /// Whether some pixel is within 8 of a colour: the colour bar's ends stand for a whole
@@ -307,11 +266,11 @@ TEST_F(RenderProgram, ScansFromAllSidesAreSeenFromAside)
   saveCloud(folder_ + "/around.pcd", cloud);
   const test::ProgramRun run = test::runProgram(
       folder_,
-      {"render", result, "--cloud", folder_ + "/around.pcd", "-o", picture_});
+      {"render", result, "--cloud", folder_ + "/around.pcd", "-o", output_});
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_NE(run.err.find("note: "), std::string::npos);
   EXPECT_NE(run.err.find("not seen from a sensor"), std::string::npos);
-  EXPECT_GT(readPicture(picture_).countOther(kWhite), 1000);
+  EXPECT_GT(readPicture(output_).countOther(kWhite), 1000);
 }
 
 TEST_F(RenderProgram, BadResultsAreNamed)

@@ -1,9 +1,11 @@
 // `holdfast report`: what is in the page and in the glTF, and what is refused. The page
 // itself is tested in a browser: test/report/.
+#include <holdfast/io/config.h>
 #include <holdfast/io/patch_io.h>
+#include <holdfast/io/patch_map_file.h>
 
-#include "support/run_program.h"
-#include "support/small_clouds.h"
+#include "support/result_program.h"
+#include "support/risk_map.h"
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -11,6 +13,7 @@
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -18,63 +21,52 @@ namespace holdfast { namespace {
 
 using Json = nlohmann::json;
 using Names = std::vector<std::string>;
+using test::Random;
 
-class ReportProgram : public testing::Test {
+const std::string kRocks = HOLDFAST_SOURCE_DIR "/samples/rocks.pcd";
+
+class ReportProgram : public test::ResultProgram {
 protected:
-  ReportProgram()
-  : folder_(test::freshFolder(
-        std::string("report_") +
-        testing::UnitTest::GetInstance()->current_test_info()->name()))
-  , page_(folder_ + "/page.html")
-  {}
-
-  /// Fits a bowl whose cloud lies beside its result and is named without a folder.
-  std::string fitBowl(const std::string& name) const
-  {
-    saveCloud(folder_ + "/" + name + ".pcd",
-              test::bowlCloud(40, 30, test::tiltedPose(), true));
-    const test::ProgramRun run = test::runProgram(
-        folder_,
-        {"fit", folder_ + "/" + name + ".pcd", "-o", folder_, "--quiet"});
-    EXPECT_EQ(run.exit_code, 0) << run.err;
-    const std::string result = folder_ + "/" + name + ".patches.json";
-    Json json = Json::parse(test::readFile(result));
-    json["cloud"] = name + ".pcd";
-    test::writeFile(result, json.dump());
-    return result;
-  }
-
-  /// \return what the program said on standard error.
-  std::string report(Names arguments) const
-  {
-    arguments.insert(arguments.begin(), "report");
-    const test::ProgramRun run = test::runProgram(folder_, arguments);
-    EXPECT_EQ(run.exit_code, 0) << run.err;
-    EXPECT_EQ(run.out, "");
-    return run.err;
-  }
+  ReportProgram() : ResultProgram("report", "page.html") {}
 
   std::string pageOf(Names arguments) const
   {
-    arguments.insert(arguments.end(), {"-o", page_});
-    EXPECT_EQ(report(arguments), "");
-    return test::readFile(page_);
+    arguments.insert(arguments.end(), {"-o", output_});
+    EXPECT_EQ(runWell(arguments), "");
+    return test::readFile(output_);
   }
 
-  /// Expects this exit code, one line that says `what`, and no page.
-  void expectError(int exit_code, Names arguments, const std::string& what) const
+  /// Risks of a ball foot. \param source a cloud or a map.
+  std::string risk(const std::string& source, const Names& more = {}) const
   {
-    arguments.insert(arguments.begin(), "report");
-    arguments.insert(arguments.end(), {"-o", page_});
+    const std::string path = folder_ + "/risk.json";
+    Names arguments{"risk", source, "--foot", "point_foot", "-o", path, "--quiet"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
     const test::ProgramRun run = test::runProgram(folder_, arguments);
-    EXPECT_EQ(run.exit_code, exit_code) << what << '\n' << run.err;
-    EXPECT_EQ(run.errorLines(), 1) << run.err;
-    EXPECT_NE(run.err.find(what), std::string::npos) << run.err;
-    EXPECT_FALSE(std::filesystem::exists(page_)) << what;
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return path;
   }
 
-  std::string folder_;
-  std::string page_;
+  /// A map of ground as `holdfast map` writes it: walk.map to go on with, walk.json to
+  /// look at.
+  void writeMap() const
+  {
+    Random random;
+    const PatchMap map = test::roughGround(4, 0.06, random);
+    savePatchMap(folder_ + "/walk.map", {map, "kinect_v1"});
+    PatchReport report;
+    report.cloud = "frames";
+    report.map = &map;
+    report.result.sensor = loadSensor("kinect_v1");
+    report.sensor_pose = map.pose();
+    for (const MapPatch& patch : map.patches()) {
+      ExtractedPatch& shown = report.result.patches.emplace_back();
+      shown.fit = toFitResult(patch);
+      shown.radius_m = patch.radius_m;
+    }
+    std::ofstream file(folder_ + "/walk.json");
+    writeJson(file, report, JsonLayout::PatchPerLine);
+  }
 };
 
 /// The text between the first `begin` and the next `end`.
@@ -93,6 +85,14 @@ std::string
 dataOf(const std::string& page)
 {
   return between(page, "<script type=\"application/json\" id=\"data\">", "</script>");
+}
+
+Json
+onlyResultOf(const std::string& page)
+{
+  const Json data = Json::parse(dataOf(page));
+  EXPECT_EQ(data.at("results").size(), 1U);
+  return data.at("results").at(0);
 }
 
 std::size_t
@@ -149,8 +149,8 @@ TEST_F(ReportProgram, NamesCannotEndTheData)
   expectError(1, {folder_ + "/bytes.json"}, "bytes.json: no result");
   text.erase(text.find('\xff'), 1);
   test::writeFile(folder_ + "/nasty.json", text);
-  report({folder_ + "/nasty.json", "-o", page_, "--quiet"});
-  const std::string page = test::readFile(page_);
+  runWell({folder_ + "/nasty.json", "-o", output_, "--quiet"});
+  const std::string page = test::readFile(output_);
   const std::string data = dataOf(page);
   EXPECT_EQ(data.find('<'), std::string::npos);
   EXPECT_EQ(count(page, "</script"), 2U);
@@ -202,18 +202,67 @@ TEST_F(ReportProgram, AResultWithoutItsCloudOrAPatchIsShown)
 {
   const std::string result = fitBowl("bowl");
   std::filesystem::remove(folder_ + "/bowl.pcd");
-  const std::string said = report({result, "-o", page_});
+  const std::string said = runWell({result, "-o", output_});
   EXPECT_NE(said.find("bowl.pcd was neither"), std::string::npos) << said;
-  const Json data = Json::parse(dataOf(test::readFile(page_)));
+  const Json data = Json::parse(dataOf(test::readFile(output_)));
   const std::string note = data.at("results").at(0).at("cloud").at("note");
   EXPECT_NE(note.find("bowl.pcd"), std::string::npos);
   Json none = Json::parse(test::readFile(result));
   none["patches"] = Json::array();
   test::writeFile(folder_ + "/none.json", none.dump());
-  report({folder_ + "/none.json", "-o", page_, "--quiet"});
+  runWell({folder_ + "/none.json", "-o", output_, "--quiet"});
   EXPECT_EQ(
-      Json::parse(dataOf(test::readFile(page_))).at("results").at(0).at("patches"),
+      Json::parse(dataOf(test::readFile(output_))).at("results").at(0).at("patches"),
       0);
+}
+
+TEST_F(ReportProgram, ARiskIsShownWithItsSoles)
+{
+  const std::string path = risk(kRocks, {"--best", "5"});
+  const Json file = Json::parse(test::readFile(path));
+  const Json shown = onlyResultOf(pageOf({path}));
+  EXPECT_EQ(shown.at("title"), "rocks.pcd");
+  EXPECT_EQ(shown.at("patches"), file.at("patches").size());
+  EXPECT_FALSE(shown.at("hasFits"));
+  EXPECT_GT(shown.at("cloud").at("of"), 1000);
+  const Json& found = shown.at("risk");
+  EXPECT_EQ(found.at("footholds"), 5);
+  EXPECT_EQ(found.at("rows").at("length"), 5);
+  const std::size_t corners = file.at("foot").at("sole_m").size();
+  EXPECT_EQ(found.at("corners"), corners);
+  EXPECT_EQ(found.at("soles").at("length"), 5 * 3 * (corners + 2));
+  EXPECT_EQ(found.at("statuses").at("length"), file.at("patches").size());
+  for (const char* member : {"foot", "load_direction", "assumptions", "ranking"})
+    EXPECT_EQ(found.at("head").at(member), file.at(member)) << member;
+  // What nobody knows of the patches is no column of zeros.
+  Names columns;
+  for (const auto& [name, ignored] : shown.at("columns").items())
+    columns.push_back(name);
+  EXPECT_EQ(columns, (Names{"area", "id", "radius", "risk"}));
+  EXPECT_LE(test::readFile(output_).size(), 2000000U);
+}
+
+TEST_F(ReportProgram, ARiskBecomesPartOfItsMap)
+{
+  writeMap();
+  const std::string map = folder_ + "/walk.json";
+  const std::string path =
+      risk(folder_ + "/walk.map", {"--load-direction", "0", "0", "-1"});
+  const Json shown = onlyResultOf(pageOf({map, path}));
+  EXPECT_TRUE(shown.at("hasFits"));
+  EXPECT_TRUE(shown.at("columns").contains("risk"));
+  EXPECT_TRUE(shown.at("columns").contains("sigma_normal"));
+  EXPECT_GT(shown.at("risk").at("footholds"), 0);
+  EXPECT_EQ(pageOf({map, path}), pageOf({path, map}));
+  // That of other patches is a result of its own.
+  Json other = Json::parse(test::readFile(path));
+  other["patches"].erase(other["patches"].size() - 1);
+  other["footholds"] = Json::array();
+  test::writeFile(folder_ + "/other.json", other.dump());
+  const Json data = Json::parse(dataOf(pageOf({map, folder_ + "/other.json"})));
+  ASSERT_EQ(data.at("results").size(), 2U);
+  EXPECT_TRUE(data.at("results").at(0).at("risk").is_null());
+  EXPECT_FALSE(data.at("results").at(1).at("hasFits"));
 }
 
 /// A little-endian number in a file.
@@ -229,7 +278,7 @@ TEST_F(ReportProgram, GlTfHasPatchesAndEllipsoids)
 {
   const std::string result = fitBowl("bowl");
   const std::string glb = folder_ + "/bowl.glb";
-  EXPECT_EQ(report({result, "--glb", glb}), "");
+  EXPECT_EQ(runWell({result, "--glb", glb}), "");
   const std::string bytes = test::readFile(glb);
   ASSERT_EQ(bytes.substr(0, 4), "glTF");
   EXPECT_EQ(word(bytes, 4), 2U);
@@ -238,7 +287,45 @@ TEST_F(ReportProgram, GlTfHasPatchesAndEllipsoids)
   EXPECT_EQ(gltf.at("nodes").at(0).at("name"), "bowl.pcd: patches");
   EXPECT_EQ(gltf.at("nodes").at(1).at("name"),
             "bowl.pcd: centres at 3 sigma, 10 times as large as they are");
-  EXPECT_FALSE(std::filesystem::exists(page_));
+  EXPECT_FALSE(std::filesystem::exists(output_));
+}
+
+TEST_F(ReportProgram, GlTfHasSoles)
+{
+  const std::string glb = folder_ + "/rocks.glb";
+  EXPECT_EQ(runWell({risk(kRocks, {"--best", "3"}), "--glb", glb}), "");
+  const std::string bytes = test::readFile(glb);
+  ASSERT_EQ(bytes.substr(0, 4), "glTF");
+  const Json gltf = Json::parse(bytes.substr(20, word(bytes, 12)));
+  ASSERT_EQ(gltf.at("nodes").size(), 2U);
+  EXPECT_EQ(gltf.at("nodes").at(1).at("name"),
+            "rocks.pcd: soles by risk, 5 mm above where they stand");
+  const Json& soles = gltf.at("meshes").at(1).at("primitives").at(0);
+  const Json& color =
+      gltf.at("accessors").at(soles.at("attributes").at("COLOR_0").get<std::size_t>());
+  EXPECT_EQ(color.at("count").get<int>() % 3, 0);
+}
+
+TEST_F(ReportProgram, BadRisksAreNamed)
+{
+  const std::string path = risk(kRocks, {"--best", "2"});
+  const Json good = Json::parse(test::readFile(path));
+  const auto expectBad = [&](const char* pointer, const Json& value, const char* what) {
+    Json bad = good;
+    bad[Json::json_pointer(pointer)] = value;
+    test::writeFile(folder_ + "/bad.json", bad.dump());
+    expectError(1, {folder_ + "/bad.json"}, std::string("bad.json: ") + what);
+  };
+  expectBad("/footholds/0/patch",
+            123456,
+            "has a foothold on a patch that is not in it");
+  expectBad("/foot/sole_m", {{0, 0}, {1, 1}}, "has a sole of fewer than three corners");
+  expectBad("/patches", Json::array(), "has no patch");
+  expectBad("/patches/0/status", "well", "has a patch of unknown status");
+  expectBad("/patches/0/surface", "cone", "has a patch of unknown type");
+  expectBad("/patches/0/parameters/0", -1.0, "has an impossible patch");
+  expectBad("/footholds/0/pose/position/0", nullptr, "is no result of 'holdfast risk'");
+  expectBad("/offset", {1, 2}, "has a vector of another length than 3");
 }
 
 TEST_F(ReportProgram, BadResultsAreNamed)

@@ -9,7 +9,9 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -42,7 +44,8 @@ protected:
     const test::ProgramRun run = simulate(all);
     EXPECT_EQ(run.exit_code, 0) << run.err;
     EXPECT_EQ(run.err, "");
-    EXPECT_EQ(run.out, "");
+    EXPECT_EQ(run.out.find(folder_ + "/" + name + ": "), 0u) << run.out;
+    EXPECT_EQ(std::count(run.out.begin(), run.out.end(), '\n'), 1) << run.out;
     return folder_ + "/" + name;
   }
 
@@ -288,22 +291,19 @@ TEST_F(SimulateTrajectory, FollowsAFile)
   EXPECT_NE(run.err.find("pose 4 (stamp 4)"), std::string::npos) << run.err;
 }
 
-TEST_F(SimulateTrajectory, FailsWithOneLineAndNoFolder)
+struct FailingRun {
+  Names arguments;
+  int exit_code;
+  std::string word; ///< that is in the message
+};
+
+/// \param folder with the files of poses that are named here.
+std::vector<FailingRun>
+failingRuns(const std::string& folder)
 {
-  const std::string one = write("one.txt", "0 0 0 1 1 0 0 0\n");
-  const std::string two = write("two.txt", "0 0 0 1 1 0 0 0\n1 0 0 1 1 0 0 0\n");
-  // The second looks at the sky.
-  const std::string sky = write("sky.txt", "0 0 0 1 1 0 0 0\n1 0 0 1 0 0 0 1\n");
-  const std::string back = write("back.txt", "1 0 0 1 1 0 0 0\n0 0 0 1 1 0 0 0\n");
-  std::filesystem::create_directory(folder_ + "/full");
-  write("full/mine", "");
-  const Names before = test::filesIn(folder_);
-  struct Case {
-    Names arguments;
-    int exit_code;
-    std::string word;
-  };
-  const std::vector<Case> cases{
+  const std::string one = folder + "/one.txt", two = folder + "/two.txt";
+  const std::string back = folder + "/back.txt", sky = folder + "/sky.txt";
+  return {
       {{"--trajectory", "walk", "--frames", "0"}, 2, "--frames"},
       {{"--trajectory", "walk", "--frames", "1"}, 2, "--frames"},
       {{"--trajectory", "walk", "--frames", "many"}, 2, "--frames"},
@@ -327,10 +327,23 @@ TEST_F(SimulateTrajectory, FailsWithOneLineAndNoFolder)
       {{"--trajectory", two, "--distance", "1"}, 2, "--distance"},
       {{"--trajectory", one}, 1, "one.txt: has one pose"},
       {{"--trajectory", back}, 1, "back.txt: line 2: the stamp 0"},
-      {{"--trajectory", folder_ + "/none.txt"}, 1, "none.txt: no such file"},
+      {{"--trajectory", folder + "/none.txt"}, 1, "none.txt: no such file"},
       {{"--trajectory", sky}, 1, "pose 1"},
   };
-  for (const Case& c : cases) {
+}
+
+TEST_F(SimulateTrajectory, FailsWithOneLineAndNoFolder)
+{
+  write("one.txt", "0 0 0 1 1 0 0 0\n");
+  write("two.txt", "0 0 0 1 1 0 0 0\n1 0 0 1 1 0 0 0\n");
+  // The second looks at the sky.
+  write("sky.txt", "0 0 0 1 1 0 0 0\n1 0 0 1 0 0 0 1\n");
+  write("back.txt", "1 0 0 1 1 0 0 0\n0 0 0 1 1 0 0 0\n");
+  std::filesystem::create_directory(folder_ + "/full");
+  write("full/mine", "");
+  const Names before = test::filesIn(folder_);
+  const std::vector<FailingRun> cases = failingRuns(folder_);
+  for (const FailingRun& c : cases) {
     Names arguments{"rocks", "-o", out_, "--stride", "16"};
     arguments.insert(arguments.end(), c.arguments.begin(), c.arguments.end());
     expectFailure(arguments, c.exit_code, c.word, before);
@@ -349,6 +362,26 @@ TEST_F(SimulateTrajectory, FailsWithOneLineAndNoFolder)
   expectFailure(into(folder_ + "/one.txt"), 1, "one.txt: is there already", before);
   expectFailure(into(folder_ + "/none/out"), 1, "none/out: cannot be written", before);
   EXPECT_EQ(test::filesIn(folder_ + "/full"), Names{"mine"});
+}
+
+TEST_F(SimulateTrajectory, SaysInOneLineWhatItWrote)
+{
+  Names arguments{"table", "--trajectory", "circle", "--frames", "3", "--step", "0.2"};
+  arguments.insert(arguments.end(), {"--stride", "16", "-o", out_});
+  const test::ProgramRun run = simulate(arguments);
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  std::size_t points = 0;
+  for (const char* name : {"/frame_0000.pcd", "/frame_0001.pcd", "/frame_0002.pcd"})
+    points += pointsOf(out_ + name).size();
+  EXPECT_EQ(run.out,
+            out_ + ": 3 frames of table by kinect_v1, 0.40 m of way, " +
+                std::to_string(points) + " points\n");
+  arguments.back() = folder_ + "/quiet";
+  arguments.emplace_back("--quiet");
+  const test::ProgramRun quiet = simulate(arguments);
+  EXPECT_EQ(quiet.exit_code, 0) << quiet.err;
+  EXPECT_EQ(quiet.out, "");
+  EXPECT_EQ(quiet.err, "");
 }
 
 TEST_F(SimulateTrajectory, HelpNamesScenesAndShowsAnExample)

@@ -65,6 +65,8 @@ PatchSupport::of(const Patch& patch) const
   for (auto at = std::lower_bound(points_.begin(), points_.end(), low, isLeft);
        at != end;
        ++at) {
+    if ((*at - pose.c).tail<2>().cwiseAbs().maxCoeff() > reach)
+      continue; // most of them
     const Eigen::Vector3d q = pose.toLocal(*at);
     if (q.head<2>().cwiseAbs().maxCoeff() > half_side)
       continue;

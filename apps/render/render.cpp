@@ -54,6 +54,7 @@ struct Subject {
   std::string title;
   std::vector<ExtractedPatch> patches;
   SeenCloud cloud;
+  bool is_measured = true; ///< the cloud; else it is made of the patches
   std::vector<Rgb> colors; ///< of the patches one by one; empty: as the legend has them
   std::vector<PictureSole> soles;
 };
@@ -99,6 +100,7 @@ mapSubject(const std::string& name, std::vector<ExtractedPatch> patches)
 {
   constexpr double kSpacing = 0.01; // m
   Subject subject;
+  subject.is_measured = false;
   for (const ExtractedPatch& patch : patches) {
     const Mesh mesh = tessellate(patch.fit.patch, kSpacing);
     subject.cloud.points.positions.insert(subject.cloud.points.positions.end(),
@@ -261,14 +263,16 @@ drawSubject(Canvas& canvas,
     if (const auto at = view.project(subject.patches[i].fit.patch.c))
       from_afar.emplace_back(at->nearness, i);
   std::sort(from_afar.begin(), from_afar.end());
-  const PatchSupport support(subject.cloud.points.positions);
+  // Where the cloud is made of the patches, each has points all over.
+  const PatchSupport support(subject.is_measured ? subject.cloud.points.positions :
+                                                   std::vector<Eigen::Vector3d>());
   for (const auto& [nearness, i] : from_afar) {
     const FitResult& fit = subject.patches[i].fit;
     const bool has_own = !subject.colors.empty();
     drawPatch(canvas,
               view,
               fit.patch,
-              support.of(fit.patch),
+              subject.is_measured ? support.of(fit.patch) : SupportedCells(),
               has_own ? subject.colors[i] : colors(fit),
               has_own ? PatchEdge::None : PatchEdge::Line); // soles have the edges
   }

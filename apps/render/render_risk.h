@@ -2,24 +2,15 @@
 #pragma once
 
 #include "render_colors.h"
+#include "risk_result.h"
 #include "view.h"
-
-#include <holdfast/pcl/patch_extraction.h>
 
 #include <string>
 #include <vector>
 
 namespace holdfast::app {
 
-/// A sole where a foothold has it.
-struct PictureSole {
-  std::vector<Eigen::Vector3d> corners; ///< frame of the points, m
-  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ(); ///< out of the surface
-  Eigen::Vector3d toe = Eigen::Vector3d::Zero(); ///< where its x axis leaves it
-  double total = 1.0; ///< its risk
-};
-
-/// A result of `holdfast risk`.
+/// What of a result can be drawn.
 struct RiskPicture {
   std::string source; ///< file
   bool is_of_map = false; ///< else of a cloud
@@ -28,7 +19,7 @@ struct RiskPicture {
   std::vector<PictureSole> soles;
 };
 
-/// \throw std::runtime_error when the text is no such result.
+/// \throw std::runtime_error when the text is no result of `holdfast risk`.
 RiskPicture readRisk(const std::string& text);
 
 /// Draws a sole as a plate with an outline and a line to its toe, in the colour of its

@@ -1,5 +1,7 @@
 #include "report/glb.h"
 
+#include "render/risk_colors.h"
+
 #include <holdfast/patch/tessellation.h>
 #include <holdfast/version.h>
 
@@ -22,6 +24,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr double kSigmas = 3.0;
+constexpr double kSoleAbove = 0.005; // m: not hidden by a bent surface
 
 /// Numbers that glTF knows by these.
 enum : int {
@@ -34,6 +37,7 @@ enum : int {
 /// Triangles with a normal in every corner.
 struct Surface {
   std::vector<Eigen::Vector3f> positions, normals;
+  std::vector<Eigen::Vector3f> colors; ///< linear; empty: those of the material
   std::vector<std::uint32_t> corners;
 };
 
@@ -91,10 +95,13 @@ primitive(const Surface& surface, std::size_t material, GlbBuffer& buffer)
 {
   const Json vectors = {{"componentType", kFloat}, {"type", "VEC3"}};
   const Json scalars = {{"componentType", kUnsignedInt}, {"type", "SCALAR"}};
-  return {{"attributes",
-           {{"POSITION",
-             buffer.add(surface.positions, bounds(surface.positions), kArrayBuffer)},
-            {"NORMAL", buffer.add(surface.normals, vectors, kArrayBuffer)}}},
+  Json attributes = {
+      {"POSITION",
+       buffer.add(surface.positions, bounds(surface.positions), kArrayBuffer)},
+      {"NORMAL", buffer.add(surface.normals, vectors, kArrayBuffer)}};
+  if (!surface.colors.empty())
+    attributes["COLOR_0"] = buffer.add(surface.colors, vectors, kArrayBuffer);
+  return {{"attributes", attributes},
           {"indices", buffer.add(surface.corners, scalars, kIndices)},
           {"material", material}};
 }
@@ -240,7 +247,29 @@ material(const std::string& name, const std::array<std::uint8_t, 3>& color)
   return {{"name", name}, {"doubleSided", true}, {"pbrMetallicRoughness", roughness}};
 }
 
-/// The materials of the surfaces in their order, then that of ellipsoids.
+/// A plate just above the surface it stands on, in the colour of its risk.
+void
+appendSole(Surface& surface, const PictureSole& sole)
+{
+  const Rgb srgb = riskColor(sole.total);
+  const Eigen::Vector3f color =
+      Eigen::Vector3d(linear(srgb[0]), linear(srgb[1]), linear(srgb[2])).cast<float>();
+  const auto first = static_cast<std::uint32_t>(surface.positions.size());
+  const auto add = [&](const Eigen::Vector3d& point) {
+    surface.positions.emplace_back((point + kSoleAbove * sole.normal).cast<float>());
+    surface.normals.emplace_back(sole.normal.cast<float>());
+    surface.colors.push_back(color);
+  };
+  add(sole.middle);
+  for (const Eigen::Vector3d& corner : sole.corners)
+    add(corner);
+  const auto count = static_cast<std::uint32_t>(sole.corners.size());
+  for (std::uint32_t i = 0; i < count; ++i)
+    for (const std::uint32_t corner : {0U, 1 + i, 1 + (i + 1) % count})
+      surface.corners.push_back(first + corner);
+}
+
+/// The materials of the surfaces in their order, then those of ellipsoids and soles.
 Json
 materials()
 {
@@ -250,6 +279,7 @@ materials()
     list.push_back(material(std::string(surfaceName(surface)), surfaceColor(surface)));
   }
   list.push_back(material("sigma of the centre", {60, 60, 70}));
+  list.push_back(material("sole", {255, 255, 255}));
   return list;
 }
 
@@ -259,6 +289,25 @@ addNode(Json& gltf, const std::string& name, Json primitives)
   gltf["meshes"].push_back({{"name", name}, {"primitives", std::move(primitives)}});
   gltf["nodes"].push_back({{"name", name}, {"mesh", gltf["meshes"].size() - 1}});
   gltf["scenes"][0]["nodes"].push_back(gltf["nodes"].size() - 1);
+}
+
+void
+addSoles(Json& gltf,
+         const ReportResult& result,
+         const Eigen::Matrix3f& up,
+         GlbBuffer& buffer)
+{
+  Surface soles;
+  for (const PictureSole& sole : result.risk->soles)
+    appendSole(soles, sole);
+  if (soles.positions.empty())
+    return;
+  turn(soles, up);
+  addNode(gltf,
+          fmt::format("{}: soles by risk, {:g} mm above where they stand",
+                      titleOf(result),
+                      1e3 * kSoleAbove),
+          Json::array({primitive(soles, kSurfaceTraits.size() + 1, buffer)}));
 }
 
 void
@@ -283,6 +332,8 @@ addResult(Json& gltf,
   if (primitives.empty())
     return;
   addNode(gltf, titleOf(result) + ": patches", std::move(primitives));
+  if (result.risk)
+    addSoles(gltf, result, up, buffer);
   if (ellipsoids.positions.empty())
     return;
   turn(ellipsoids, up);

@@ -3,6 +3,7 @@
 #include "report/binary_block.h"
 #include "report/page_template.h"
 #include "report/point_share.h"
+#include "report/risk_data.h"
 
 #include <holdfast/fit/names.h>
 #include <holdfast/geometry/constants.h>
@@ -246,12 +247,22 @@ anyFinite(const std::vector<float>& numbers)
   });
 }
 
+/// Known without the fit.
+bool
+isOfShape(const Column& column)
+{
+  const std::string_view name = column.name;
+  return name == "area" || name == "radius";
+}
+
 Json
 columnsJson(const ReportResult& result, BinaryBlock& block)
 {
   Json columns = Json::object();
   std::vector<float> numbers;
   for (const Column& column : kColumns) {
+    if (!result.has_fits && !isOfShape(column))
+      continue;
     numbers.clear();
     for (const ExtractedPatch& patch : result.report.result.patches)
       numbers.push_back(static_cast<float>(column.value(patch)));
@@ -310,6 +321,7 @@ resultJson(const ReportResult& result, std::size_t points, BinaryBlock& block)
   return {{"title", titleOf(result)},
           {"source", result.source},
           {"isMap", result.report.is_of_map},
+          {"hasFits", result.has_fits},
           {"head", result.head},
           {"offset", arrayOf(result.report.offset)},
           {"patches", patches.size()},
@@ -318,6 +330,7 @@ resultJson(const ReportResult& result, std::size_t points, BinaryBlock& block)
           {"estimates", estimatesJson(patches, block)},
           {"columns", columnsJson(result, block)},
           {"meshes", meshesJson(patches, block)},
+          {"risk", riskJson(result, block)},
           {"cloud", cloudJson(result, points, block)}};
 }
 
@@ -388,6 +401,7 @@ pageData(const std::vector<ReportResult>& results, std::size_t points)
                      {"statuses", kStatusNames.words},
                      {"verdicts", kVerdictNames.words},
                      {"flags", flagNames()},
+                     {"riskScale", riskScaleJson()},
                      {"results", list},
                      {"binary", block.base64()}});
 }

@@ -26,12 +26,16 @@ constexpr const char* kExamples = R"(Examples:
       several results, to choose from on the page
   holdfast report walk.json --cloud walk.ply -o walk.html
       a map of 'holdfast map', with points to go with it
+  holdfast report walk.json risk.json -o walk.html
+      the map with what 'holdfast risk walk.map' has found on it
+  holdfast report risk.json -o risk.html
+      the same without the map's covariances, or a risk on a cloud
   holdfast report results/scene.patches.json --glb scene.glb
       the patches and their uncertainty for any viewer of glTF
 
 The page shows cloud and patches in 3D with the uncertainty of centres and normals, a
 table to filter and sort, every number of a patch, histograms, and what was left out and
-why. It asks for nothing from anywhere. Where it would become larger than --max-size its
+why; of a risk the soles where they may step, and a table of them. It asks for nothing from anywhere. Where it would become larger than --max-size its
 clouds are thinned, and it says so.
 )";
 
@@ -65,13 +69,14 @@ addReportOptions(CLI::App& command, ReportSettings& settings)
   command
       .add_option("RESULT",
                   settings.results,
-                  "JSON as holdfast fit, map and live write it: NAME.patches.json, a "
-                  "map, or lines of objects")
+                  "JSON as holdfast fit, map, live and risk write it: "
+                  "NAME.patches.json, a map, a risk, or lines of objects")
       ->required();
   command.add_option("-o,--output", settings.page, "Page to write")
       ->check(named(".html", "the report is a page"))
       ->type_name("FILE.html");
-  command.add_option("--glb", settings.glb, "Binary glTF of patches and ellipsoids")
+  command
+      .add_option("--glb", settings.glb, "Binary glTF of patches, ellipsoids and soles")
       ->check(named(".glb", "binary glTF"))
       ->type_name("FILE.glb");
   command
@@ -108,6 +113,7 @@ readResults(const ReportSettings& settings)
   for (const std::string& path : settings.results)
     for (ReportResult& result : readReportResults(path))
       results.push_back(std::move(result));
+  joinRisks(results);
   const std::size_t count = results.size();
   if (count <= kMostResults)
     return results;
@@ -130,7 +136,7 @@ addClouds(std::vector<ReportResult>& results, const ReportSettings& settings)
   for (ReportResult& result : results)
     addCloud(result, settings.cloud, settings.input, notices);
   for (const ReportResult& result : results)
-    if (!result.cloud && result.head.contains("input"))
+    if (!result.cloud && namesCloud(result))
       notices.push_back(result.source + ": " + result.cloud_note);
   for (const std::string& notice : notices)
     if (!settings.quiet)

@@ -7,7 +7,9 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <cstdint>
 #include <filesystem>
+#include <map>
 #include <stdexcept>
 #include <string_view>
 
@@ -44,7 +46,6 @@ extrasOf(const Json& patch)
     if (const auto at = from.find(name); at != from.end() && at->is_number())
       extras[name] = *at;
   };
-  take(patch, "risk");
   if (const auto map = patch.find("map"); map != patch.end() && map->is_object())
     for (const char* name :
          {"id", "views", "independent_views", "last_seen", "conflicts", "roughness"})
@@ -67,6 +68,13 @@ readRest(const std::string& text, ReportResult& result)
       result.extras.push_back(extrasOf(patch));
   }
   result.head.erase("patches");
+}
+
+void
+addRisk(const TriedPatch& tried, Json& extras)
+{
+  if (tried.total)
+    extras["risk"] = *tried.total;
 }
 
 Eigen::Vector3d
@@ -106,6 +114,77 @@ loadOptionsOf(const ReportResult& result,
   return options;
 }
 
+/// What a page shows of a result of `holdfast risk`.
+ReportResult
+riskReport(const std::string& path, const std::string& text)
+{
+  ReportResult result;
+  result.source = path;
+  result.has_fits = false;
+  try {
+    result.risk = readRiskResult(text);
+  }
+  catch (const std::runtime_error& error) {
+    throw std::runtime_error(path + ": " + error.what());
+  }
+  const RiskResult& risk = *result.risk;
+  result.report.cloud = risk.source;
+  result.report.is_of_map = risk.is_of_map;
+  result.report.offset = risk.offset;
+  for (const TriedPatch& tried : risk.patches) {
+    result.report.result.patches.push_back(tried.patch);
+    Json& extras = result.extras.emplace_back(Json::object());
+    extras["id"] = tried.id;
+    addRisk(tried, extras);
+  }
+  result.head = {{"sensor", risk.head.value("sensor", Json::object())}};
+  return result;
+}
+
+ReportResult
+reportOf(const std::string& path, const std::string& text)
+{
+  if (isRiskResult(text))
+    return riskReport(path, text);
+  ReportResult result;
+  result.source = path;
+  result.report = parseResult(path, text);
+  readRest(text, result);
+  return result;
+}
+
+/// Whether these are the same patch of the same map.
+bool
+isSame(const ExtractedPatch& patch, const Json& extras, const TriedPatch& tried)
+{
+  constexpr double kRounding = 1e-9; // m
+  if (extras.value("id", Json()) != Json(tried.id))
+    return false;
+  const FitResult &a = patch.fit, &b = tried.patch.fit;
+  return !isUsable(a.status) || !isUsable(b.status) ||
+         (a.patch.c - b.patch.c).norm() <= kRounding;
+}
+
+/// The patches of a risk in the order of a map's; nothing when they are not the same.
+std::optional<std::vector<TriedPatch>>
+inOrderOf(const ReportResult& map, const RiskResult& risk)
+{
+  const auto& patches = map.report.result.patches;
+  if (!map.report.is_of_map || map.risk || patches.size() != risk.patches.size())
+    return std::nullopt;
+  std::map<std::uint64_t, const TriedPatch*> by_id;
+  for (const TriedPatch& tried : risk.patches)
+    by_id[tried.id] = &tried;
+  std::vector<TriedPatch> ordered;
+  for (std::size_t i = 0; i < patches.size(); ++i) {
+    const auto found = by_id.find(map.extras[i].value("id", std::uint64_t{0}));
+    if (found == by_id.end() || !isSame(patches[i], map.extras[i], *found->second))
+      return std::nullopt;
+    ordered.push_back(*found->second);
+  }
+  return ordered;
+}
+
 } // namespace
 
 std::vector<ReportResult>
@@ -113,19 +192,48 @@ readReportResults(const std::string& path)
 {
   std::vector<ReportResult> results;
   for (const std::string& text : objectsOf(readResultText(path))) {
-    ReportResult result;
-    result.source = path;
-    result.report = parseResult(path, text);
     try {
-      readRest(text, result);
-      sensorPoseOf(result);
+      results.push_back(reportOf(path, text));
+      sensorPoseOf(results.back());
     }
     catch (const Json::exception& error) {
       throw std::runtime_error(path + ": no result of holdfast: " + error.what());
     }
-    results.push_back(std::move(result));
   }
   return results;
+}
+
+void
+joinRisks(std::vector<ReportResult>& results)
+{
+  const auto hasJoined = [&](ReportResult& alone) {
+    if (alone.has_fits)
+      return false;
+    for (ReportResult& map : results)
+      if (auto ordered = inOrderOf(map, *alone.risk)) {
+        map.risk = std::move(alone.risk);
+        map.risk->patches = std::move(*ordered);
+        for (std::size_t i = 0; i < map.extras.size(); ++i)
+          addRisk(map.risk->patches[i], map.extras[i]);
+        return true;
+      }
+    return false;
+  };
+  std::vector<ReportResult> rest;
+  std::vector<bool> has_joined;
+  for (ReportResult& result : results)
+    has_joined.push_back(hasJoined(result));
+  for (std::size_t i = 0; i < results.size(); ++i)
+    if (!has_joined[i])
+      rest.push_back(std::move(results[i]));
+  results = std::move(rest);
+}
+
+bool
+namesCloud(const ReportResult& result)
+{
+  return !result.report.is_of_map &&
+         (result.head.contains("input") || !result.has_fits);
 }
 
 void
@@ -134,7 +242,7 @@ addCloud(ReportResult& result,
          const InputOptions& input,
          std::vector<std::string>& notices)
 {
-  const bool has_own = !result.report.is_of_map && result.head.contains("input");
+  const bool has_own = namesCloud(result);
   std::optional<std::string> path;
   if (!cloud.empty())
     path = cloud;

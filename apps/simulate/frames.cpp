@@ -11,7 +11,10 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
+#include <iostream>
 #include <random>
 #include <stdexcept>
 #include <string>
@@ -94,8 +97,35 @@ cloudNames(std::size_t frames)
   return names;
 }
 
-/// Writes all files into a folder.
-void
+std::size_t
+pointsIn(const RangeImage& image)
+{
+  return static_cast<std::size_t>(
+      std::count_if(image.points.begin(),
+                    image.points.end(),
+                    [](const Eigen::Vector3d& point) { return point.allFinite(); }));
+}
+
+/// \throw std::runtime_error when nothing is seen from there.
+RangeImage
+frameAt(const FrameSimulator& simulator,
+        int k,
+        const Pose& pose,
+        const SimulatedView& view)
+{
+  RangeImage image = inSensorFrame(simulator.frame(k, pose));
+  if (!seesAnything(image))
+    throw std::runtime_error(
+        fmt::format("not written: nothing of the scene {} is within the range of "
+                    "sensor {} at pose {}",
+                    view.scene.name,
+                    view.sensor.name,
+                    k));
+  return image;
+}
+
+/// Writes all files into a folder. \return the number of points.
+std::size_t
 writeFrames(const std::string& folder,
             const SimulateArguments& arguments,
             const SimulatedView& view,
@@ -111,28 +141,34 @@ writeFrames(const std::string& folder,
   const std::vector<std::string> names = cloudNames(poses.size());
   const int frames = static_cast<int>(poses.size());
   ProgressBar bar("simulating", !arguments.quiet);
+  std::size_t points = 0;
   for (int k = 0; k < frames; ++k) {
     const auto i = static_cast<std::size_t>(k);
-    const RangeImage image = inSensorFrame(simulator.frame(k, poses[i].pose));
-    if (!seesAnything(image))
-      throw std::runtime_error(
-          fmt::format("not written: nothing of the scene {} is within the range of "
-                      "sensor {} at pose {}",
-                      view.scene.name,
-                      view.sensor.name,
-                      k));
+    const RangeImage image = frameAt(simulator, k, poses[i].pose, view);
     saveCloud(folder + "/" + names[i],
               cloudOf(image,
                       view.sensor,
                       arguments.simulation.noise_scale,
                       arguments.covariance),
               arguments.ascii);
+    points += pointsIn(image);
     bar.update(k + 1, frames);
   }
   writeTrajectory(folder + "/trajectory.txt", poses);
   if (arguments.moving.wantsOdometry())
     writeTrajectory(folder + "/odometry.txt", odometryOf(poses, arguments));
   saveJson(folder + "/truth.json", movingTruthJson(arguments, view, names));
+  return points;
+}
+
+/// m
+double
+lengthOf(const std::vector<StampedPose>& poses)
+{
+  double length = 0.0;
+  for (std::size_t k = 1; k < poses.size(); ++k)
+    length += (poses[k].pose.c - poses[k - 1].pose.c).norm();
+  return length;
 }
 
 } // namespace
@@ -144,8 +180,9 @@ simulateFrames(const SimulateArguments& arguments, const SimulatedView& view)
       stampedPoses(arguments.moving, view.scene, arguments.quiet);
   AtomicFolder folder(arguments.output);
   const std::string& temporary = folder.temporaryPath();
+  std::size_t points = 0;
   try {
-    writeFrames(temporary, arguments, view, poses);
+    points = writeFrames(temporary, arguments, view, poses);
   }
   catch (const std::runtime_error& error) {
     // The user knows no folder but the one asked for.
@@ -155,6 +192,14 @@ simulateFrames(const SimulateArguments& arguments, const SimulatedView& view)
     throw std::runtime_error(arguments.output + ": " + message);
   }
   folder.commit();
+  if (!arguments.quiet)
+    std::cout << fmt::format("{}: {} frames of {} by {}, {:.2f} m of way, {} points\n",
+                             arguments.output,
+                             poses.size(),
+                             view.scene.name,
+                             view.sensor.name,
+                             lengthOf(poses),
+                             points);
 }
 
 } // namespace holdfast::app

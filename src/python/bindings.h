@@ -22,6 +22,7 @@ void bindCalibration(py::module_& module);
 void bindPatchMap(py::module_& module);
 void bindFoot(py::module_& module);
 void bindContact(py::module_& module);
+void bindRiskGrid(py::module_& module);
 
 /// A rigid transform as a (4, 4) matrix.
 /// \throw py::value_error for what is none.

@@ -15,7 +15,6 @@
 #include <limits>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -31,15 +30,6 @@ struct RiskObject {
 struct RisksObject {
   std::vector<Foothold> rows;
 };
-
-py::tuple
-assumptions()
-{
-  py::tuple out(kRiskAssumptions.size());
-  for (std::size_t i = 0; i < kRiskAssumptions.size(); ++i)
-    out[i] = py::str(std::string(kRiskAssumptions[i]));
-  return out;
-}
 
 void
 requireSense(const std::string& error)
@@ -137,15 +127,6 @@ evaluate(const PatchMap& map, const Foot& foot, std::vector<Foothold>& footholds
     foothold.risk =
         contactRisk(contactSurfaceOf(map, *patch, prior), foot, foothold.placement);
   }
-}
-
-const PatchMapObject&
-mapOf(py::handle object)
-{
-  if (!py::isinstance<PatchMapObject>(object))
-    throw py::type_error("patch_map: a holdfast.PatchMap is needed, not " +
-                         kindText(object));
-  return object.cast<const PatchMapObject&>();
 }
 
 py::object
@@ -292,7 +273,7 @@ bindOneRisk(py::module_& module)
         rowHelp(column).c_str());
   type.def_property_readonly(
           "assumptions",
-          [](const RiskObject&) { return assumptions(); },
+          [](const RiskObject&) { return riskAssumptions(); },
           "RISK_ASSUMPTIONS.")
       .def("__repr__", [](const RiskObject& self) {
         return "<holdfast.ContactRisk: " + riskText(self.row) + ">";
@@ -324,7 +305,7 @@ bindManyRisks(py::module_& module)
         rowsHelp(column).c_str());
   type.def_property_readonly(
           "assumptions",
-          [](const RisksObject&) { return assumptions(); },
+          [](const RisksObject&) { return riskAssumptions(); },
           "RISK_ASSUMPTIONS.")
       .def("to_dict", arraysOf, "to_dict() -> dict of str: array\n\nAll by name.")
       .def("__len__", [](const RisksObject& self) { return self.rows.size(); })
@@ -370,22 +351,13 @@ bindRanking(py::module_& module)
           "further (Foot.reach) wants a map of a larger radius_m.")
       .def_property_readonly(
           "assumptions",
-          [](const FootholdRanking&) { return assumptions(); },
+          [](const FootholdRanking&) { return riskAssumptions(); },
           "RISK_ASSUMPTIONS.")
       .def("__len__", [](const FootholdRanking& r) { return r.footholds.size(); })
       .def("__repr__", [](const FootholdRanking& r) {
         return "<holdfast.FootholdRanking: " + std::to_string(r.footholds.size()) +
                " footholds on " + std::to_string(r.candidates) + " patches>";
       });
-}
-
-std::string
-assumptionsHelp()
-{
-  std::string text = "\nTakes for granted (RISK_ASSUMPTIONS)\n";
-  for (const std::string_view each : kRiskAssumptions)
-    text += wrapped("- " + std::string(each) + ".");
-  return text;
 }
 
 std::string
@@ -429,7 +401,7 @@ riskHelp()
       "`min_support` of\n"
       "    the sole is over surface that was seen there is no number: look at `ok` "
       "first.\n" +
-          assumptionsHelp() +
+          riskAssumptionsHelp() +
           "\n"
           "Raises\n"
           "    TypeError: an argument is of another kind.\n"
@@ -465,7 +437,7 @@ rankingHelp()
           "\n"
           "Returns\n"
           "    a FootholdRanking. It does not depend on the number of threads.\n" +
-          assumptionsHelp() +
+          riskAssumptionsHelp() +
           "\n"
           "Raises\n"
           "    TypeError: an argument is of another kind, or there is no such option.\n"
@@ -482,7 +454,7 @@ bindContact(py::module_& module)
   bindOneRisk(module);
   bindManyRisks(module);
   bindRanking(module);
-  module.attr("RISK_ASSUMPTIONS") = assumptions();
+  module.attr("RISK_ASSUMPTIONS") = riskAssumptions();
   module.def("contact_risk",
              contactRiskOf,
              py::arg("surface"),

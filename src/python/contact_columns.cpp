@@ -2,6 +2,7 @@
 
 #include "arrays.h"
 #include "bindings.h"
+#include "keywords.h"
 
 #include <holdfast/contact/names.h>
 
@@ -9,6 +10,7 @@
 #include <cstdint>
 #include <limits>
 #include <string>
+#include <string_view>
 
 namespace holdfast::python {
 namespace {
@@ -232,6 +234,24 @@ contactColumns()
     return all;
   }();
   return columns;
+}
+
+py::tuple
+riskAssumptions()
+{
+  py::tuple out(kRiskAssumptions.size());
+  for (std::size_t i = 0; i < kRiskAssumptions.size(); ++i)
+    out[i] = py::str(std::string(kRiskAssumptions[i]));
+  return out;
+}
+
+std::string
+riskAssumptionsHelp()
+{
+  std::string text = "\nTakes for granted (RISK_ASSUMPTIONS)\n";
+  for (const std::string_view each : kRiskAssumptions)
+    text += wrapped("- " + std::string(each) + ".");
+  return text;
 }
 
 } // namespace holdfast::python

@@ -7,6 +7,7 @@
 #include <pybind11/pybind11.h>
 
 #include <functional>
+#include <string>
 #include <vector>
 
 namespace holdfast::python {
@@ -24,5 +25,11 @@ struct ContactColumn {
 };
 
 const std::vector<ContactColumn>& contactColumns();
+
+/// kRiskAssumptions
+py::tuple riskAssumptions();
+
+/// The same as a section of help.
+std::string riskAssumptionsHelp();
 
 } // namespace holdfast::python

@@ -15,12 +15,12 @@ failKind(const std::string& name, const char* wanted, py::handle got)
   throw py::type_error(name + ": " + wanted + " is needed, not " + kindText(got));
 }
 
-/// numpy's own bool is no Python bool.
+/// numpy's own bool is no Python bool; its name is another one from numpy 2 on.
 bool
 isFlag(py::handle value)
 {
   return PyBool_Check(value.ptr()) != 0 ||
-         py::str(py::type::of(value).attr("__name__")).cast<std::string>() == "bool_";
+         py::isinstance(value, py::module_::import("numpy").attr("bool_"));
 }
 
 } // namespace

@@ -44,11 +44,28 @@ toArray(const Pose& pose)
   return toArray(T);
 }
 
+/// Arrays of numpy 2 are laid out as pybind11 knows them from 2.12 on; before that they
+/// would be read wrongly, without a word.
+void
+requireKnownNumpy()
+{
+  constexpr int kFirstForNumpy2 = 0x020C0000;
+  if (PYBIND11_VERSION_HEX >= kFirstForNumpy2)
+    return;
+  const std::string version =
+      py::str(py::module_::import("numpy").attr("__version__")).cast<std::string>();
+  if (version[0] != '1')
+    throw py::import_error("holdfast was built with a pybind11 older than 2.12, which "
+                           "does not know numpy " +
+                           version + ": build it with a newer one, or use numpy 1");
+}
+
 } // namespace holdfast::python
 
 PYBIND11_MODULE(_core, module)
 {
   using namespace holdfast::python;
+  requireKnownNumpy();
   py::options options;
   options.disable_function_signatures();
   module.doc() = "The compiled part of holdfast.";
@@ -62,4 +79,5 @@ PYBIND11_MODULE(_core, module)
   bindPatchMap(module);
   bindFoot(module);
   bindContact(module);
+  bindRiskGrid(module);
 }

@@ -17,6 +17,16 @@
 #include <utility>
 
 namespace holdfast::python {
+
+const PatchMapObject&
+mapOf(py::handle object)
+{
+  if (!py::isinstance<PatchMapObject>(object))
+    throw py::type_error("patch_map: a holdfast.PatchMap is needed, not " +
+                         kindText(object));
+  return object.cast<const PatchMapObject&>();
+}
+
 namespace {
 
 struct MapRequest {

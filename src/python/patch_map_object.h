@@ -107,4 +107,7 @@ private:
   std::optional<Motion> pending_;
 };
 
+/// \throw py::type_error for anything else.
+const PatchMapObject& mapOf(py::handle object);
+
 } // namespace holdfast::python

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import struct
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -199,6 +202,112 @@ def test_a_map_without_patches_has_no_footholds(kinect, foot):
     assert not holdfast.contact_risk(empty, foot, (0, 0, 1), AHEAD).ok
 
 
+@pytest.fixture(scope="module")
+def grid(rock_map, foot, down):
+    return holdfast.risk_grid(rock_map, foot, down, resolution_m=0.04, yaws=4, threads=0)
+
+
+def test_layers_are_views_of_the_grid(grid):
+    rows, columns = grid.shape
+    layers = grid.layers
+    assert list(layers) == list(grid) and len(grid) == len(layers) == 14
+    for name, layer in layers.items():
+        assert layer.shape == (rows, columns) and layer.dtype == np.float32, name
+        assert np.shares_memory(layer, grid[name]) and layer.flags.f_contiguous
+        assert not layer.flags.writeable
+    assert rows * columns > 200 and grid.resolution_m == 0.04
+    # They outlive the grid.
+    risk = holdfast.risk_grid(holdfast.PatchMap(holdfast.Sensor.load("kinect_v1")),
+                              holdfast.Foot.make((0.1, 0.1)), AHEAD)["risk_total"]  # fmt: skip
+    assert risk.shape == (0, 0)
+    assert f"{rows} x {columns} cells of 0.04 m" in repr(grid)
+    assert grid.assumptions == holdfast.RISK_ASSUMPTIONS
+
+
+def test_cells_lie_where_the_grid_says(grid, down):
+    np.testing.assert_allclose(grid.axes[:, 2], -down, atol=1e-12)
+    np.testing.assert_allclose(np.diff(grid.x), -0.04, atol=1e-9)
+    np.testing.assert_allclose(np.diff(grid.y), -0.04, atol=1e-9)
+    middle = [grid.x.mean(), grid.y.mean(), 0.0]
+    np.testing.assert_allclose(grid.position, middle, atol=1e-9)
+    own = grid.points @ grid.axes
+    elevation = grid["elevation"]
+    seen = np.isfinite(elevation)
+    assert seen.sum() > 100 and not seen.all()
+    np.testing.assert_array_equal(seen, np.isfinite(grid.points).all(axis=2))
+    x, y = np.meshgrid(grid.x, grid.y, indexing="ij")
+    np.testing.assert_allclose(own[seen][:, 0], x[seen], atol=1e-9)
+    np.testing.assert_allclose(own[seen][:, 1], y[seen], atol=1e-9)
+    np.testing.assert_allclose(own[seen][:, 2], elevation[seen], atol=1e-5)
+    normal = np.stack([grid[f"normal_{axis}"] for axis in "xyz"], axis=2)[seen]
+    np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1.0, atol=1e-5)
+    assert (normal[:, 2] > 0).all() and (grid["elevation_sigma"][seen] > 0).all()
+
+
+def test_a_cell_says_what_a_contact_there_says(grid, rock_map, foot, down):
+    total = grid["risk_total"]
+    known = np.isfinite(total)
+    assert known.sum() > 50
+    asked = holdfast.contact_risk(rock_map, foot, grid.points[known], down)
+    # A cell takes the patch on top, a contact that of the nearest anchor: they are the same
+    # where the sole stands on the cell's surface, and turned alike where no turn is best.
+    off = np.linalg.norm(asked.pose[:, :3, 3] - grid.points[known], axis=1)
+    same = (off < 1e-6) & (grid["yaw_best"][known] == 0.0)
+    assert same.sum() > 20
+    for name in ("total", "slip", "gap", "support"):
+        values = grid[f"risk_{name}"][known][same]
+        np.testing.assert_allclose(getattr(asked, name)[same], values, atol=1e-5, err_msg=name)
+
+
+def tiff_layers(path):
+    """Pages of float32 by their names: what `holdfast risk --layers` writes."""
+    data = path.read_bytes()
+    (at,) = struct.unpack_from("<I", data, 4)
+    layers = {}
+    while at:
+        (count,) = struct.unpack_from("<H", data, at)
+        tags = {}
+        for k in range(count):
+            tag, kind, length, value = struct.unpack_from("<HHII", data, at + 2 + 12 * k)
+            tags[tag] = (length, value)
+        name = data[tags[270][1] :].split(b"\0", 1)[0].decode()
+        shape = tags[257][1], tags[256][1]
+        layers[name] = np.frombuffer(data, "<f4", shape[0] * shape[1], tags[273][1]).reshape(shape)
+        (at,) = struct.unpack_from("<I", data, at + 2 + 12 * count)
+    return layers
+
+
+def test_the_program_writes_the_same_layers(rock_map, down, tmp_path):
+    program = Path(os.environ.get("HOLDFAST_BUILD_DIR", "")) / "bin" / "holdfast"
+    if not program.is_file():
+        pytest.skip("no program beside the module")
+    rock_map.save(tmp_path / "rocks.map")
+    subprocess.run(
+        [program, "risk", "rocks.map", "--foot", "point_foot", "--layers", "layers.tif",
+         "--resolution", "0.05", "--quiet",
+         "--load-direction", *(f"{x:.17g}" for x in down)],
+        cwd=tmp_path, check=True,
+    )  # fmt: skip
+    written = tiff_layers(tmp_path / "layers.tif")
+    foot = holdfast.Foot.load("point_foot")
+    made = holdfast.risk_grid(rock_map, foot, down, resolution_m=0.05, threads=0)
+    assert list(written) == list(made)
+    for name, layer in written.items():
+        np.testing.assert_allclose(made[name], layer, atol=1e-6, equal_nan=True, err_msg=name)
+
+
+def test_grids_have_the_bounds_asked_for(rock_map, foot, down):
+    bounds = np.array([[-0.1, -0.2], [0.1, 0.1]])
+    small = holdfast.risk_grid(rock_map, foot, down, resolution_m=0.05, yaws=1, bounds=bounds)
+    assert small.shape == (4, 6)
+    assert small.x.max() < 0.1 and small.y.min() > -0.2
+    one = holdfast.risk_grid(
+        rock_map, foot, 2 * down, resolution_m=0.05, yaws=1, bounds=bounds, threads=2
+    )
+    for name, layer in small.layers.items():
+        np.testing.assert_array_equal(layer, one[name], err_msg=name)
+
+
 FOOT_CASES = [
     (ValueError, r"sole: shape \(2,\) of length and width, or \(N, 2\)", ((1, 2, 3),), {}),
     (TypeError, "sole: .*real numbers", ("long",), {}),
@@ -276,3 +385,42 @@ def test_rankings_that_make_no_sense(kinect, foot):
         holdfast.rank_footholds(made, foot, AHEAD, spacing=1)
     with pytest.raises(ValueError, match="load"):
         holdfast.rank_footholds(made, foot, (0, 0, 0))
+
+
+GRID_CASES = [
+    (ValueError, "resolution must be > 0", {"resolution_m": 0.0}),
+    (ValueError, "resolution_m: it is not a number", {"resolution_m": np.nan}),
+    (TypeError, "resolution_m: a number is needed, not str", {"resolution_m": "fine"}),
+    (ValueError, "yaw", {"yaws": 0}),
+    (ValueError, "threads", {"threads": -1}),
+    (TypeError, r"risk_grid\(\) has no option 'resolution'; it has resolution_m", {"resolution": 1}),
+    (ValueError, r"bounds: shape \(2, 2\) of the lowest x, y", {"bounds": (0, 1)}),
+    (ValueError, "low ones below the high", {"bounds": [[1, 1], [0, 0]]}),
+    (ValueError, "bounds must be finite", {"bounds": [[0, 0], [1, np.inf]]}),
+    (TypeError, "bounds: .*real numbers", {"bounds": "all"}),
+    (ValueError, "10 million cells", {"bounds": [[0, 0], [100, 100]], "resolution_m": 0.01}),
+]
+
+
+@pytest.mark.parametrize("case", range(len(GRID_CASES)))
+def test_grids_that_make_no_sense(case, kinect, foot, capfd):
+    error, message, options = GRID_CASES[case]
+    with pytest.raises(error, match=message):
+        holdfast.risk_grid(holdfast.PatchMap(kinect), foot, AHEAD, **options)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_arguments_of_grids_that_are_none(kinect, foot, grid):
+    made = holdfast.PatchMap(kinect)
+    with pytest.raises(TypeError, match="patch_map: a holdfast.PatchMap is needed, not list"):
+        holdfast.risk_grid([], foot, AHEAD)
+    with pytest.raises(TypeError, match="foot: a holdfast.Foot is needed, not str"):
+        holdfast.risk_grid(made, "humanoid_foot", AHEAD)
+    with pytest.raises(ValueError, match="load"):
+        holdfast.risk_grid(made, foot, (0, 0, 0))
+    with pytest.raises(KeyError, match="'risk' is none of elevation, "):
+        grid["risk"]
+    with pytest.raises(TypeError, match="layer: a text is needed, not int"):
+        grid[0]
+    with pytest.raises(ValueError, match="read-only"):
+        grid["risk_total"][0, 0] = 0.0

@@ -89,13 +89,15 @@ def test_everything_has_help():
     for name in holdfast.__all__:
         thing = getattr(holdfast, name)
         assert thing.__doc__, name
+        if callable(thing):
+            assert thing.__module__ == "holdfast", name
         if inspect.isclass(thing):
             for member, value in vars(thing).items():
                 if not member.startswith("_"):
                     assert getattr(thing, member).__doc__, f"{name}.{member}"
 
 
-@pytest.mark.parametrize("name", ["fit", "fit_many", "extract", "simulate", "contact_risk", "rank_footholds"])
+@pytest.mark.parametrize("name", ["fit", "fit_many", "extract", "simulate", "contact_risk", "rank_footholds", "risk_grid"])
 def test_help_teaches(name):
     function = getattr(holdfast, name)
     parameters = inspect.signature(function).parameters

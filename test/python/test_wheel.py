@@ -7,10 +7,13 @@ import re
 import shutil
 import subprocess
 import sys
+import tarfile
 import zipfile
 from pathlib import Path
 
 import pytest
+
+pybind11 = pytest.importorskip("pybind11")
 
 ROOT = Path(__file__).resolve().parents[2]
 BUILD = os.environ.get("HOLDFAST_BUILD_DIR")
@@ -66,6 +69,28 @@ def test_holds_the_module_its_types_and_sensors(wheel):
         next(name for name in names if name.endswith("METADATA"))
     )
     assert re.findall(rb"Requires-Dist: (\w+)", metadata) == [b"numpy"]
+    # Before 2.12 pybind11 knows no numpy 2.
+    knows_numpy_2 = pybind11.version_info[:2] >= (2, 12)
+    assert (b"<2" in re.search(rb"Requires-Dist: (.*)", metadata).group(1)) != knows_numpy_2
+    assert any(name.endswith("LICENSE") for name in names)
+
+
+def test_the_sources_that_are_packed_are_all_it_takes(tmp_path):
+    source = tmp_path / "source"
+    shutil.copytree(ROOT, source, ignore=shutil.ignore_patterns("build*", ".git", "test"))
+    pack = f"from setuptools import build_meta; build_meta.build_sdist({str(tmp_path)!r})"
+    run(sys.executable, "-c", pack, cwd=source)
+    (packed,) = tmp_path.glob("holdfast-*.tar.gz")
+    assert packed.stat().st_size < 2e6
+    with tarfile.open(packed) as file:
+        names = {name.partition("/")[2] for name in file.getnames()}
+    for folder in ("cmake", "config", "include", "src"):
+        for path in (ROOT / folder).rglob("*"):
+            if path.is_file() and "__pycache__" not in path.parts:
+                assert str(path.relative_to(ROOT)) in names, path
+    tops = {name.partition("/")[0] for name in names}
+    assert tops >= {"CMakeLists.txt", "LICENSE", "pyproject.toml", "setup.py", "samples"}
+    assert not tops & {"apps", "build", "test"}
 
 
 def test_works_in_a_fresh_environment(wheel, tmp_path):

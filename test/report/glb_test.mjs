@@ -10,8 +10,9 @@ import { run } from './browser.mjs';
 const { HOLDFAST_PROGRAM: program, HOLDFAST_SOURCE_DIR: source } = process.env;
 const folder = join(process.env.HOLDFAST_SCRATCH_DIR, 'report_glb');
 
+mkdirSync(folder, { recursive: true });
+
 test('glTF of all types of patches and of their ellipsoids is valid', async () => {
-  mkdirSync(folder, { recursive: true });
   run(program, 'fit', join(source, 'samples/rocks.pcd'), '-o', folder, '--spacing', '0.1', '--quiet');
   const glb = join(folder, 'rocks.glb');
   run(program, 'report', join(folder, 'rocks.patches.json'), '--glb', glb, '--magnification', '20',
@@ -30,4 +31,18 @@ test('glTF of all types of patches and of their ellipsoids is valid', async () =
   // 128 triangles each.
   const [ellipsoids] = gltf.meshes[1].primitives;
   assert.equal(gltf.accessors[ellipsoids.indices].count, 3 * 128 * patches.length);
+});
+
+test('glTF of soles is valid', async () => {
+  const risk = join(folder, 'risk.json');
+  run(program, 'risk', join(source, 'samples/rocks.pcd'), '--foot', 'point_foot', '-o', risk, '--quiet');
+  const glb = join(folder, 'risk.glb');
+  run(program, 'report', risk, '--glb', glb, '--quiet');
+  const bytes = readFileSync(glb);
+  const { issues } = await validator.validateBytes(new Uint8Array(bytes));
+  assert.equal(issues.numErrors + issues.numWarnings, 0, JSON.stringify(issues.messages.slice(0, 5)));
+  const gltf = JSON.parse(bytes.subarray(20, 20 + bytes.readUInt32LE(12)).toString());
+  const { footholds, foot } = JSON.parse(readFileSync(risk, 'utf8'));
+  const [soles] = gltf.meshes.at(-1).primitives;
+  assert.equal(gltf.accessors[soles.indices].count, 3 * foot.sole_m.length * footholds.length);
 });

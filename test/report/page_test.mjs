@@ -429,6 +429,84 @@ test('the table is walked through by keys, and has names for who does not see it
   await page.close();
 });
 
+// What 'holdfast risk' finds on the rocks, and its page.
+function riskPage(...more) {
+  const cloud = join(source, 'samples/rocks.pcd');
+  run(program, 'risk', cloud, '--foot', 'point_foot', '--best', '12', '-o', inFolder('risk.json'), '--quiet');
+  const found = JSON.parse(readFileSync(inFolder('risk.json'), 'utf8'));
+  return { found, path: report('risk.html', inFolder('risk.json'), ...more) };
+}
+
+test('a risk is shown by its colours, its soles and a table of its footholds', async () => {
+  const { found, path } = riskPage();
+  const { page, complaints } = await open(browser, path);
+  assert.equal(await page.$eval('#coloring', (select) => select.value), 'risk');
+  assert.match(await page.$eval('#legend', (legend) => legend.textContent), /0\.1 %.*100 %.*too little seen/);
+  const rows = await page.$$eval('#footholds tbody tr', (all) =>
+    all.map((row) => [...row.cells].map((cell) => cell.textContent)));
+  assert.equal(rows.length, 12);
+  const numbers = new Map(found.patches.map(({ patch }, i) => [patch, i]));
+  rows.forEach((row, k) => {
+    const { patch, risk } = found.footholds[k];
+    assert.equal(row[0], String(k + 1));
+    assert.equal(Number(row[1]), numbers.get(patch));
+    const percent = 100 * risk.total;
+    if (percent < 0.999e-3) assert.equal(row[2], '< 0.001');
+    else assert.ok(Math.abs(Number(row[2]) - percent) <= 1e-3 * percent, row[2]);
+  });
+  const calls = await drawCalls(page);
+  assert.ok(calls <= 6, `${calls}`);
+  await page.screenshot({ path: inFolder('risk.png') });
+  await page.$$eval('#controls input[name=soles]', ([box]) => box.click());
+  assert.equal(await drawCalls(page), calls - 1);
+  await page.$$eval('#controls input[name=soles]', ([box]) => box.click());
+  assert.deepEqual(complaints, []);
+  await page.close();
+});
+
+test('a foothold selects its patch, and says what it is', async () => {
+  const { found, path } = riskPage();
+  const { page, complaints } = await open(browser, path);
+  await page.click('#footholds tbody tr:nth-child(2) td');
+  const patch = found.patches.findIndex(({ patch: id }) => id === found.footholds[1].patch);
+  assert.equal(await page.evaluate(() => window.holdfastReport.selected), patch);
+  for (const table of ['#table', '#footholds'])
+    assert.deepEqual(await page.$$eval(`${table} tr[aria-current]`, (all) =>
+      all.map((row) => Number(row.dataset.patch))), [patch], table);
+  const details = await page.$eval('#details', (part) => part.innerText);
+  assert.match(details, /number 2 of 12/);
+  assert.ok(!details.includes('State'), 'no fit, no state');
+  const about = await page.$eval('#about', (part) => part.textContent);
+  for (const word of ['point_foot', 'load direction']) assert.ok(about.includes(word), word);
+  const footholds = await page.$eval('#footholds', (part) => part.textContent);
+  for (const assumption of found.assumptions) assert.ok(footholds.includes(assumption), assumption);
+  await filter(page, 'insufficient');
+  assert.deepEqual((await rows(page)).sort((a, b) => a - b), found.patches.flatMap(({ status }, i) =>
+    (status === 'insufficient_support' ? [i] : [])));
+  await filter(page, 'risk<1');
+  assert.deepEqual((await rows(page)).sort((a, b) => a - b), found.patches.flatMap(({ total }, i) =>
+    (total !== null && Math.fround(total) * 100 < 1 ? [i] : [])));
+  assert.deepEqual(complaints, []);
+  await page.close();
+});
+
+test('a phone shows a risk without scrolling sideways', async () => {
+  const { path } = riskPage();
+  const { page, complaints } = await open(browser, path,
+    { width: 390, height: 844, isMobile: true, hasTouch: true });
+  assert.ok((await page.evaluate(() => document.documentElement.scrollWidth)) <= 390);
+  await page.screenshot({ path: inFolder('risk_phone.png'), fullPage: true });
+  assert.deepEqual(complaints, []);
+  await page.close();
+});
+
+test('a result without a risk has no footholds', async () => {
+  const { page } = await open(browser, inFolder('rocks.html'));
+  assert.ok(await page.$eval('#footholds', (section) => section.hidden));
+  assert.equal((await page.$$('#controls input[name=soles]')).length, 0);
+  await page.close();
+});
+
 test('dark screens get a dark page', async () => {
   const { page } = await open(browser, inFolder('rocks.html'));
   const paper = () => page.$eval('body', (body) => getComputedStyle(body).backgroundColor);

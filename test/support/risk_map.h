@@ -1,4 +1,4 @@
-/// \file Maps of ground to step on.
+/// \file Measurements of patches, and maps of ground to step on.
 #pragma once
 
 #include "support/random.h"

@@ -23,6 +23,7 @@ from ._core import (
     Patch,
     Patches,
     PatchMap,
+    RiskGrid,
     Sensor,
     Simulation,
     __version__,
@@ -32,6 +33,7 @@ from ._core import (
     fit,
     fit_many,
     rank_footholds,
+    risk_grid,
     scene_names,
     simulate,
 )
@@ -47,6 +49,7 @@ __all__ = [
     "PatchMap",
     "Patches",
     "RISK_ASSUMPTIONS",
+    "RiskGrid",
     "Sensor",
     "Simulation",
     "__version__",
@@ -56,21 +59,13 @@ __all__ = [
     "fit",
     "fit_many",
     "rank_footholds",
+    "risk_grid",
     "scene_names",
     "simulate",
 ]
 
 # What users see, in messages and in help().
-for _thing in (
-    ContactRisk,
-    ContactRisks,
-    Foot,
-    FootholdRanking,
-    Patch,
-    Patches,
-    PatchMap,
-    Sensor,
-    Simulation,
-):
-    _thing.__module__ = __name__
-del _thing
+for _name in __all__:
+    if callable(globals()[_name]):
+        globals()[_name].__module__ = __name__
+del _name

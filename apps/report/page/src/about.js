@@ -1,6 +1,6 @@
 // What was left out and why, the options, the sensor, the version.
 import { el } from './dom.js';
-import { spaced } from './measures.js';
+import { leftOutOf, spaced } from './measures.js';
 
 function list(pairs) {
   return el('dl', { class: 'facts' }, pairs.flatMap(([name, value]) =>
@@ -30,7 +30,7 @@ const part = (title, ...children) => el('div', {}, el('h3', {}, title), children
 
 function leftOut(result) {
   const { rejected = {}, cloud_points: points = {} } = result.head;
-  const reasons = Object.entries(rejected).map(([reason, count]) => [spaced(reason), String(count)]);
+  const reasons = [...Object.entries(rejected), ...leftOutOf(result.risk)].map(([reason, count]) => [spaced(reason), String(count)]);
   const shapeless = Array.from({ length: result.count }, (_, i) => i).filter((i) => !result.hasShape(i)).length;
   if (shapeless) reasons.push(['in the table, but not drawn: too little is known of them', String(shapeless)]);
   const lost = Object.entries(points)
@@ -53,18 +53,25 @@ function cloudText({ cloud, isMap }) {
     : `${cloud.file}: all ${shown} points${isMap ? '' : ' with a measurement'}`;
 }
 
+// What was asked; what came of it is said elsewhere.
+function riskFacts({ foot = {}, load_direction, options = {}, ranking = {} }) {
+  const { sole_m: corners = [], ...rest } = foot;
+  return flattened({ foot: { ...rest, corners: corners.length }, load_direction, ...options, widest_support_m: ranking.widest_support_m ?? null });
+}
+
 export function showAbout(holder, result, made) {
   const { head } = result;
   const notices = head.notices ?? [];
-  const origin = [['result', result.source], [result.isMap ? 'made from' : 'cloud', head.cloud],
-    ['holdfast', head.holdfast ?? 'before it said so'], ['page by holdfast', made]];
+  const origin = [['result', result.source], [result.isMap ? 'made from' : 'cloud', head.cloud ?? result.title],
+    ...(result.hasFits ? [['holdfast', head.holdfast ?? 'before it said so']] : []), ['page by holdfast', made]];
   if (head.timestamp_us !== undefined) origin.push(['timestamp', `${head.timestamp_us} \u00b5s`]);
   holder.replaceChildren(
     leftOut(result),
     part('Where it comes from', list(origin), el('p', { class: 'quiet', id: 'cloud-note' }, cloudText(result)),
       notices.length ? el('ul', {}, notices.map((notice) => el('li', {}, notice))) : null),
     part('Sensor', list(flattened(head.sensor ?? {}))),
-    part('Options', list(flattened(head.options ?? {}))),
-    part('Input and timing', list([...flattened(head.input ?? {}), ...flattened(head.timing ?? {})])),
+    ...(result.risk ? [part('Risk', list(riskFacts(result.risk.head)))] : []),
+    ...(result.hasFits ? [part('Options', list(flattened(head.options ?? {}))),
+      part('Input and timing', list([...flattened(head.input ?? {}), ...flattened(head.timing ?? {})]))] : []),
   );
 }

@@ -43,15 +43,48 @@ export function typeColoring(result) {
   };
 }
 
-function scaleBar(low, high) {
-  const width = 180;
+const kBar = 180; // px
+
+// \param labels [{ at, text }], at 0 to 1.
+function scaleBar(colorAt, labels) {
   const bars = Array.from({ length: 60 }, (_, k) =>
-    svg('rect', { x: 3 * k, width: 3.2, height: 9, fill: css(viridis((k + 0.5) / 60)) }));
-  const label = (x, anchor, value) =>
-    svg('text', { x, y: 21, 'text-anchor': anchor }, format(Number(value.toPrecision(2))));
-  return svg('svg', { width, height: 24, 'aria-hidden': 'true' }, bars,
-    label(0, 'start', low), label(width / 2, 'middle', Math.sqrt(low * high)),
-    label(width, 'end', high));
+    svg('rect', { x: 3 * k, width: 3.2, height: 9, fill: css(colorAt((k + 0.5) / 60)) }));
+  const words = labels.map(({ at, text }) => {
+    const anchor = at === 0 ? 'start' : at === 1 ? 'end' : 'middle';
+    return svg('text', { x: at * kBar, y: 21, 'text-anchor': anchor }, text);
+  });
+  return svg('svg', { width: kBar, height: 24, 'aria-hidden': 'true' }, bars, words);
+}
+
+// As `holdfast render --color risk` has it: logarithmic, the same for all results.
+function riskScale({ least, colors }) {
+  const stops = colors.map(parseHex);
+  const place = (risk) => 1 - Math.log(Math.min(1, Math.max(least, risk))) / Math.log(least);
+  const colorAt = (at) => {
+    const t = at * (stops.length - 1);
+    const first = Math.min(Math.floor(t), stops.length - 2);
+    return stops[first].map((x, c) => x + (t - first) * (stops[first + 1][c] - x));
+  };
+  return { place, colorAt };
+}
+
+// The colours of soles.
+export function soleColors({ names, risk }) {
+  const { place, colorAt } = riskScale(names.riskScale);
+  return Array.from(risk.columns.total, (total) => colorAt(place(total)));
+}
+
+export function riskColoring(result) {
+  const { least, colors, none } = result.names.riskScale;
+  const { place, colorAt } = riskScale({ least, colors });
+  const gray = parseHex(none);
+  const risks = result.columns.risk ?? [];
+  const labels = [least, 0.01, 0.1, 1].map((risk) => ({ at: place(risk), text: `${format(100 * risk)} %` }));
+  return {
+    color: (i) => (Number.isFinite(risks[i]) ? colorAt(place(risks[i])) : gray),
+    legend: () => el('div', { class: 'scale' }, 'total risk ', scaleBar(colorAt, labels),
+      el('div', {}, swatch(none), 'too little seen')),
+  };
 }
 
 // Logarithmic; the outer 5 % on each side are as the ends.
@@ -64,7 +97,9 @@ export function measureColoring(result, measure) {
   return {
     color: (i) => (values[i] > 0 ? viridis(place(values[i])) : kNoNumber),
     legend: () => {
-      const range = positive.length ? scaleBar(low, high) : ' (no patch has one)';
+      const labels = [low, Math.sqrt(low * high), high].map((value, k) =>
+        ({ at: k / 2, text: format(Number(value.toPrecision(2))) }));
+      const range = positive.length ? scaleBar(viridis, labels) : ' (no patch has one)';
       return el('div', { class: 'scale' }, measure.heading, range);
     },
   };

@@ -5,11 +5,11 @@ import { format } from './measures.js';
 import { median } from './linear.js';
 
 export const kDefaults = {
-  sigmas: 3, cloud: true, patches: true, frames: false, centres: true, normals: false,
+  sigmas: 3, cloud: true, patches: true, soles: true, frames: false, centres: true, normals: false,
 };
 
 const kShown = [
-  ['cloud', 'cloud'], ['patches', 'patches'], ['frames', 'frames'],
+  ['cloud', 'cloud'], ['patches', 'patches'], ['soles', 'soles'], ['frames', 'frames'],
   ['centres', 'sigma of centres'], ['normals', 'sigma of normals'],
 ];
 
@@ -20,6 +20,7 @@ function magnifiedText(view) {
   const { sigmas, magnification, centres, normals } = view.options;
   if (!centres && !normals) return '';
   const known = view.centres.filter(Boolean);
+  if (!view.result.hasFits) return '';
   if (known.length === 0) return 'This result has no covariance to show.';
   const factor = magnification === 1
     ? 'drawn as large as they are'
@@ -37,8 +38,14 @@ function magnifiedText(view) {
   ].filter(Boolean).join(' ');
 }
 
-// \param colorings [{ name, label }]; onColor(name)
-export function showControls(view, colorings, onColor) {
+// What a result has nothing of is not offered.
+function isOffered(name, { risk, hasFits }) {
+  if (name === 'soles') return risk !== null;
+  return hasFits || !['centres', 'normals'].includes(name);
+}
+
+// \param colorings [{ name, label }]; chosen one of their names; onColor(name)
+export function showControls(view, colorings, chosen, onColor) {
   const say = () => {
     byId('magnified').textContent = magnifiedText(view);
   };
@@ -46,13 +53,14 @@ export function showControls(view, colorings, onColor) {
     view.set(options);
     say();
   };
-  const checks = kShown.map(([name, label]) => el('label', {}, el('input', {
+  const { result } = view;
+  const checks = kShown.filter(([name]) => isOffered(name, result)).map(([name, label]) => el('label', {}, el('input', {
     type: 'checkbox', name, checked: view.options[name],
     disabled: name === 'cloud' && !view.cloud,
     onchange: (event) => set({ [name]: event.target.checked }),
   }), label));
   const color = el('select', { id: 'coloring', onchange: (event) => onColor(event.target.value) },
-    colorings.map(({ name, label }) => el('option', { value: name }, label)));
+    colorings.map(({ name, label }) => el('option', { value: name, selected: name === chosen }, label)));
   const sigmas = el('select', {
     id: 'sigmas', onchange: (event) => set({ sigmas: Number(event.target.value) }),
   }, [1, 2, 3].map((k) => el('option', { value: k, selected: k === view.options.sigmas }, String(k))));
@@ -69,7 +77,9 @@ export function showControls(view, colorings, onColor) {
   const reset = el('button', { type: 'button', onclick: () => view.resetCamera() }, 'First view');
   byId('controls').replaceChildren(
     el('label', {}, 'Colour', color), ...checks,
-    el('label', {}, 'sigma', sigmas), el('label', {}, 'magnified', magnifier, shown), reset,
+    ...(result.hasFits
+      ? [el('label', {}, 'sigma', sigmas), el('label', {}, 'magnified', magnifier, shown)] : []),
+    reset,
   );
   say();
 }

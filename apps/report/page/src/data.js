@@ -44,11 +44,43 @@ function starts(count, size) {
 
 const triangle = (n) => (n * (n + 1)) / 2;
 
+// What `holdfast risk` has found: of each patch, and of footholds, best first.
+export class Risk {
+  constructor({ head, statusNames, footholds, corners, ...arrays }, bytes) {
+    const { statuses, rows, soles, columns } = unpacked(bytes, arrays);
+    Object.assign(this, { head, columns, rows });
+    this.count = footholds;
+    this.statusOf = (i) => statusNames[statuses[i]];
+    const point = (at) => Array.from(soles.subarray(3 * at, 3 * at + 3));
+    // Of each foothold, m, in the frame of the cloud's points.
+    this.soles = Array.from({ length: footholds }, (_, k) => {
+      const first = k * (corners + 2);
+      return {
+        corners: Array.from({ length: corners }, (__, c) => point(first + c)),
+        middle: point(first + corners),
+        toe: point(first + corners + 1),
+      };
+    });
+  }
+
+  // Foothold k is on this patch.
+  patchOf(k) {
+    return this.rows[k];
+  }
+
+  // Null where there is none.
+  footholdOn(i) {
+    const k = this.rows.indexOf(i);
+    return k < 0 ? null : k;
+  }
+}
+
 export class Result {
   constructor(json, bytes, names) {
     this.title = json.title;
     this.source = json.source;
     this.isMap = json.isMap;
+    this.hasFits = json.hasFits; // else of the patches no more than shapes is known
     this.head = json.head;
     this.offset = json.offset;
     this.count = json.patches;
@@ -59,6 +91,7 @@ export class Result {
     this.meshes = unpacked(bytes, json.meshes);
     this.cloud = unpacked(bytes, json.cloud);
     this.estimates = unpacked(bytes, json.estimates);
+    this.risk = json.risk ? new Risk(json.risk, bytes) : null;
     const type = (i) => this.typeOf(i);
     this.parameterStarts = starts(this.count, (i) => type(i).parameters.length);
     this.stateStarts = starts(this.count, (i) => type(i).state.length);
@@ -74,7 +107,9 @@ export class Result {
     return this.meshes.vertexCounts[i] > 0;
   }
 
+  // Null where there is no fit to have one.
   statusOf(i) {
+    if (!this.hasFits) return null;
     return this.names.statuses[this.kinds.statuses[i]];
   }
 
@@ -109,6 +144,13 @@ export class Result {
     );
   }
 
+  // All that is said of a patch in words.
+  wordsOf(i) {
+    const contact = this.risk?.statusOf(i);
+    return [this.statusOf(i), this.verdictOf(i), ...this.flagsOf(i), contact === 'ok' ? null : contact]
+      .filter(Boolean);
+  }
+
   // In the frame of the cloud's points, m.
   centreOf(i) {
     const parameters = this.parametersOf(i);
@@ -140,7 +182,7 @@ export class Result {
 export function readData(text) {
   const json = JSON.parse(text);
   const bytes = unzlibSync(bytesOf(json.binary));
-  const { version, types, statuses, verdicts, flags } = json;
-  const names = { types, statuses, verdicts, flags };
+  const { version, types, statuses, verdicts, flags, riskScale } = json;
+  const names = { types, statuses, verdicts, flags, riskScale };
   return { version, results: json.results.map((result) => new Result(result, bytes, names)) };
 }

@@ -115,8 +115,28 @@ function matrixPart(result, i) {
     choice('of', 'State or parameters', ['state', 'parameters']), 'in m, rad, 1/m'), holder];
 }
 
+function contactWords(risk, i) {
+  const k = risk.footholdOn(i);
+  const foothold = k === null ? 'none' : `number ${k + 1} of ${risk.count}`;
+  return [['contact', spaced(risk.statusOf(i))], ['foothold', foothold]];
+}
+
+// Tables of numbers with their sigmas; without a fit there are no sigmas, and no state.
+function estimates(result, i) {
+  const type = result.typeOf(i);
+  const axis = { c_x: 0, c_y: 1, c_z: 2 };
+  const offset = (name) => (name in axis ? result.offset[axis[name]] : 0);
+  const parameters = valueTable('Parameters', type.parameters, result.parametersOf(i),
+    result.parameterCovarianceOf(i), offset);
+  if (!result.hasFits) return result.hasShape(i) ? parameters : [];
+  return [...sigmaTable(result, i), ...parameters,
+    ...valueTable('State', type.state, result.stateOf(i), result.stateCovarianceOf(i), offset),
+    ...matrixPart(result, i)];
+}
+
 function facts(result, i) {
-  const words = [['status', spaced(result.statusOf(i))]];
+  const words = result.hasFits ? [['status', spaced(result.statusOf(i))]] : [];
+  if (result.risk) words.push(...contactWords(result.risk, i));
   if (result.verdictOf(i)) words.push(['verdict', spaced(result.verdictOf(i))]);
   const flags = result.flagsOf(i);
   if (flags.length) words.push(['flags', flags.map(spaced).join(', ')]);
@@ -135,15 +155,10 @@ export function showDetails(holder, result, i) {
     return;
   }
   const type = result.typeOf(i);
-  const axis = { c_x: 0, c_y: 1, c_z: 2 };
-  const offset = (name) => (name in axis ? result.offset[axis[name]] : 0);
   holder.replaceChildren(
     el('h2', {}, swatch(type.color), `Patch ${i}: ${spaced(type.surface)}, ${type.boundary}`),
-    ...sigmaTable(result, i),
-    ...valueTable('Parameters', type.parameters, result.parametersOf(i), result.parameterCovarianceOf(i), offset),
-    ...valueTable('State', type.state, result.stateOf(i), result.stateCovarianceOf(i), offset),
-    ...matrixPart(result, i),
-    el('h3', {}, 'Fit'),
+    ...estimates(result, i),
+    el('h3', {}, result.hasFits ? 'Fit' : 'Patch'),
     facts(result, i),
   );
 }

@@ -43,8 +43,7 @@ function comparison(parts, measures) {
 // What stands in the words of a patch.
 export function wordsOf(result, i) {
   const { surface, boundary } = result.typeOf(i);
-  return [`#${i}`, surface, boundary, result.statusOf(i), result.verdictOf(i) ?? '',
-    ...result.flagsOf(i)].join(' ').replaceAll('_', ' ').toLowerCase();
+  return [`#${i}`, surface, boundary, ...result.wordsOf(i)].join(' ').replaceAll('_', ' ').toLowerCase();
 }
 
 // { test(i), error }: error is empty or says what is not understood.

@@ -51,6 +51,18 @@ export function patchOfVertex(vertexStarts, vertex) {
   return low;
 }
 
+// All soles as one mesh: { positions, colors, starts, triangles(k) }, fans about their
+// middles; sole k has the vertices from starts[k].
+export function mergedSoles({ soles, count }, soleColors) {
+  const size = count ? soles[0].corners.length : 0;
+  const positions = new Float32Array(soles.flatMap(({ middle, corners }) => [middle, ...corners].flat()));
+  const colors = new Float32Array(soleColors.flatMap((color) => new Array(size + 1).fill(color).flat()));
+  const starts = soles.map((_, k) => k * (size + 1));
+  const triangles = (k) => Array.from({ length: size }, (_, c) =>
+    [starts[k], starts[k] + 1 + c, starts[k] + 1 + ((c + 1) % size)]).flat();
+  return { positions, colors, starts, triangles };
+}
+
 // Segments with colours.
 export class Lines {
   constructor() {
@@ -65,6 +77,12 @@ export class Lines {
 
   addFrame(origin, axes, length) {
     axes.forEach((axis, k) => this.add(origin, along(origin, length, axis), kAxisColors[k]));
+  }
+
+  // Edges, and a line to the toe.
+  addSole({ corners, middle, toe }, color) {
+    corners.forEach((corner, c) => this.add(corner, corners[(c + 1) % corners.length], color));
+    this.add(middle, toe, color);
   }
 
   // The first vertices of a patch are those of its outline.

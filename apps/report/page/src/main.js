@@ -1,10 +1,11 @@
 // A report of Holdfast: data in the page, a view, a table, plots, and what they share.
 import { showAbout } from './about.js';
-import { measureColoring, typeColoring } from './colors.js';
+import { measureColoring, riskColoring, typeColoring } from './colors.js';
 import { kDefaults, showControls } from './controls.js';
 import { readData } from './data.js';
 import { showDetails } from './details.js';
 import { byId, el } from './dom.js';
+import { showFootholds } from './footholds.js';
 import { coloringMeasures } from './measures.js';
 import { histogramFigure } from './plots.js';
 import { View } from './scene.js';
@@ -13,6 +14,7 @@ import { Table } from './table.js';
 const data = readData(byId('data').textContent);
 let result = null;
 let plots = [];
+let footholds = null;
 
 function makeView() {
   try {
@@ -38,12 +40,18 @@ function select(i) {
   view?.select(i);
   showDetails(byId('details'), result, i);
   plots.forEach((plot) => plot.mark(i));
+  footholds.mark(i);
   window.holdfastReport.selected = i;
 }
 
-function color(name) {
+function coloringOf(name) {
+  if (name === 'risk') return riskColoring(result);
   const measure = coloringMeasures(result).find((m) => m.name === name);
-  const coloring = measure ? measureColoring(result, measure) : typeColoring(result);
+  return measure ? measureColoring(result, measure) : typeColoring(result);
+}
+
+function color(name) {
+  const coloring = coloringOf(name);
   view.setColoring(coloring);
   byId('legend').replaceChildren(coloring.legend());
 }
@@ -51,13 +59,14 @@ function color(name) {
 function showView() {
   view.show(result, kDefaults);
   const measures = coloringMeasures(result).map(({ name, label }) => ({ name, label }));
-  color('type');
-  showControls(view, [{ name: 'type', label: 'type' }, ...measures], color);
+  const first = result.risk ? 'risk' : 'type';
+  color(first);
+  showControls(view, [{ name: 'type', label: 'type' }, ...measures], first, color);
 }
 
 function showPlots() {
   plots = coloringMeasures(result).map((measure) => histogramFigure(result, measure, {
-    logarithmic: measure.name.startsWith('sigma'),
+    logarithmic: measure.name.startsWith('sigma') || measure.name === 'risk',
     expected: measure.name === 'chi2_per_dof' ? 1 : null,
   }));
   byId('histograms').replaceChildren(...plots.map(({ figure }) => figure));
@@ -66,10 +75,13 @@ function showPlots() {
 function showTitle() {
   const sensor = result.head.sensor?.name;
   const patches = result.count === 1 ? '1 patch' : `${result.count} patches`;
+  const { foot } = result.risk?.head ?? {};
+  const found = result.risk
+    ? `${result.risk.count} footholds of ${foot?.name ?? 'a foot'}` : '';
   document.title = `${result.title} \u2013 Holdfast report`;
   byId('title').textContent = result.title;
-  byId('subtitle').textContent = [result.isMap ? `map of ${patches}` : patches,
-    sensor ? `sensor ${sensor}` : '', `holdfast ${result.head.holdfast ?? '?'}`]
+  byId('subtitle').textContent = [result.isMap ? `map of ${patches}` : patches, found,
+    sensor ? `sensor ${sensor}` : '', result.head.holdfast ? `holdfast ${result.head.holdfast}` : '']
     .filter(Boolean).join(' \u00b7 ');
 }
 
@@ -78,6 +90,7 @@ function show(which) {
   showTitle();
   if (view) showView();
   showPlots();
+  footholds = showFootholds(byId('footholds'), result, select);
   table.show(result);
   showAbout(byId('about-body'), result, data.version);
   select(null);
@@ -86,8 +99,8 @@ function show(which) {
 function offerResults() {
   if (data.results.length < 2) return;
   byId('chooser').hidden = false;
-  byId('result').append(...data.results.map(({ title, count }, i) =>
-    el('option', { value: i }, `${title} (${count})`)));
+  byId('result').append(...data.results.map(({ title, count, risk }, i) =>
+    el('option', { value: i }, `${title} (${risk ? `${risk.count} footholds` : count})`)));
   byId('result').addEventListener('change', (event) => show(Number(event.target.value)));
 }
 

@@ -21,6 +21,7 @@ const kKnown = {
   view_angle: { label: 'view angle', unit: '\u00b0', scale: kDegree },
   stray: { label: 'stray', unit: '%', scale: 100 },
   roughness: { label: 'roughness', unit: 'mm', scale: 1e3 },
+  risk: { label: 'risk', unit: '%', scale: 100 },
   second_attempt: { label: 'second attempt', digits: 0 },
 };
 
@@ -33,6 +34,22 @@ const kTable = [
 // Those that colours can show, and histograms.
 export const kColoring = ['sigma_centre', 'sigma_normal', 'chi2_per_dof', 'risk'];
 
+// Of footholds, in this order in their table.
+const kFootholds = {
+  total: { label: 'total', unit: '%', scale: 100 },
+  joint: { label: 'joint', unit: '%', scale: 100 },
+  slip: { label: 'slip', unit: '%', scale: 100 },
+  height: { label: 'height', unit: '%', scale: 100 },
+  tilt: { label: 'tilt', unit: '%', scale: 100 },
+  gap: { label: 'gap', unit: '%', scale: 100 },
+  support: { label: 'support', unit: '%', scale: 100 },
+  cvar_gap: { label: 'worst gaps', unit: 'mm', scale: 1e3 },
+  contact_area: { label: 'contact', unit: 'cm\u00b2', scale: 1e4 },
+  support_share: { label: 'sole on seen', unit: '%', scale: 100 },
+  yaw: { label: 'yaw', unit: '\u00b0', scale: kDegree },
+  views: { label: 'views', digits: 0 },
+};
+
 export function format(value, digits) {
   if (!Number.isFinite(value)) return '\u2013';
   if (digits !== undefined) return value.toFixed(digits);
@@ -41,23 +58,36 @@ export function format(value, digits) {
   return Number(value.toPrecision(size >= 1e3 ? 6 : 4)).toString();
 }
 
+// Probabilities so small are nobody's to know.
+const kLeastPercent = 1e-3;
+
+function textOf(value, unit, digits) {
+  return unit === '%' && value > 0 && value < kLeastPercent
+    ? `< ${kLeastPercent}` : format(value, digits);
+}
+
 // { name, label, unit, heading, value(i), text(i) }, value in the unit.
-export function measure(result, name) {
-  const known = kKnown[name] ?? {};
+function measureOf(columns, name, known) {
   const label = known.label ?? name.replaceAll('_', ' ');
   const scale = known.scale ?? 1;
-  const whole = result.columns[name].every((x) => !Number.isFinite(x) || Number.isInteger(x));
+  const whole = columns[name].every((x) => !Number.isFinite(x) || Number.isInteger(x));
   const digits = known.digits ?? (whole && scale === 1 ? 0 : undefined);
-  const value = (i) => result.columns[name][i] * scale;
+  const unit = known.unit ?? '';
+  const value = (i) => columns[name][i] * scale;
   return {
     name,
     label,
-    unit: known.unit ?? '',
-    heading: known.unit ? `${label} (${known.unit})` : label,
+    unit,
+    heading: unit ? `${label} (${unit})` : label,
     value,
-    text: (i) => format(value(i), digits === undefined ? undefined : digits),
+    text: (i) => textOf(value(i), unit, digits),
   };
 }
+
+const measure = (result, name) => measureOf(result.columns, name, kKnown[name] ?? {});
+
+export const footholdMeasures = ({ columns }) =>
+  Object.entries(kFootholds).map(([name, known]) => measureOf(columns, name, known));
 
 export const tableMeasures = (result) =>
   kTable.filter((name) => name in result.columns).map((name) => measure(result, name));
@@ -67,5 +97,9 @@ export const allMeasures = (result) =>
 
 export const coloringMeasures = (result) =>
   kColoring.filter((name) => name in result.columns).map((name) => measure(result, name));
+
+// [reason, number] of the patches that are no footholds.
+export const leftOutOf = (risk) => Object.entries(risk?.head.ranking ?? {}).filter(([name, n]) =>
+  !['candidates', 'footholds', 'widest_support_m'].includes(name) && n > 0);
 
 export const spaced = (name) => name.replaceAll('_', ' ');

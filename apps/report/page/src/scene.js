@@ -1,17 +1,17 @@
-// The 3D view: five things to draw at most, whatever the number of patches.
+// The 3D view: six things to draw at most, whatever the number of patches.
 import {
   BufferAttribute, BufferGeometry, ColorManagement, DirectionalLight, DoubleSide,
   HemisphereLight, InstancedMesh, LineBasicMaterial, LineSegments,
-  LinearSRGBColorSpace, Matrix4, Mesh, MeshLambertMaterial, PerspectiveCamera, Points,
+  LinearSRGBColorSpace, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, PerspectiveCamera, Points,
   PointsMaterial, Raycaster, Scene, SphereGeometry, Vector2, Vector3, WebGLRenderer,
 } from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { firstView } from './camera.js';
-import { parseHex } from './colors.js';
+import { parseHex, soleColors } from './colors.js';
 import { cssColor } from './dom.js';
 import { centreEllipsoid, normalEllipsoid, visibleMagnification } from './ellipsoids.js';
 import { median } from './linear.js';
-import { Lines, mergedPatches, patchOfVertex, visibleIndex } from './geometry.js';
+import { Lines, mergedPatches, mergedSoles, patchOfVertex, visibleIndex } from './geometry.js';
 
 const kManyPatches = 800; // from here on ellipsoids are coarser
 
@@ -77,7 +77,7 @@ export class View {
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.recolor());
   }
 
-  // \param options { sigmas, cloud, patches, frames, centres, normals }
+  // \param options { sigmas, cloud, patches, soles, frames, centres, normals }
   show(result, options) {
     this.result = result;
     this.options = { ...options };
@@ -93,6 +93,7 @@ export class View {
     this.placeCamera();
     this.addCloud();
     this.addPatches();
+    this.addSoles();
     this.addLines();
     this.addEllipsoids();
   }
@@ -161,6 +162,20 @@ export class View {
     this.scene.add(this.mesh);
   }
 
+  // Plates in the colour of their risk, whatever the patches show.
+  addSoles() {
+    this.soles = null;
+    if (!this.result.risk?.count) return;
+    this.soles = mergedSoles(this.result.risk, soleColors(this.result));
+    const geometry = new BufferGeometry();
+    geometry.setAttribute('position', new BufferAttribute(this.soles.positions, 3));
+    geometry.setAttribute('color', new BufferAttribute(this.soles.colors.slice(), 3));
+    const material = new MeshBasicMaterial({ vertexColors: true, side: DoubleSide });
+    this.soleMesh = new Mesh(geometry, standOff(material, 1 - 0.5 * this.lift));
+    this.soleMesh.frustumCulled = false;
+    this.scene.add(this.soleMesh);
+  }
+
   addLines() {
     const material = standOff(new LineBasicMaterial({ vertexColors: true }), 1 - 0.1 * this.lift);
     this.lines = new LineSegments(new BufferGeometry(), material);
@@ -212,9 +227,23 @@ export class View {
       for (let v = vertexStarts[i]; v < vertexStarts[i + 1]; ++v) array.set(color, 3 * v);
     }
     this.mesh.geometry.attributes.color.needsUpdate = true;
+    this.recolorSoles(ink);
     this.centreMesh.material.color.setRGB(...parseHex(cssColor('--centre')));
     this.normalMesh.material.color.setRGB(...parseHex(cssColor('--normal')));
     this.update();
+  }
+
+  // That on the selected patch is as the patch, which it covers.
+  recolorSoles(ink) {
+    if (!this.soles) return;
+    const { array } = this.soleMesh.geometry.attributes.color;
+    array.set(this.soles.colors);
+    const size = array.length / 3 / this.soles.starts.length;
+    this.soles.starts.forEach((first, k) => {
+      if (this.result.risk.patchOf(k) !== this.selected) return;
+      for (let v = first; v < first + size; ++v) array.set(ink, 3 * v);
+    });
+    this.soleMesh.geometry.attributes.color.needsUpdate = true;
   }
 
   // All changes until the next picture are worked off together.
@@ -229,9 +258,24 @@ export class View {
     if (this.cloud) this.cloud.visible = cloud;
     this.mesh.visible = patches;
     this.mesh.geometry.setIndex(new BufferAttribute(visibleIndex(this.patches, this.visible), 1));
+    this.updateSoles();
     this.updateLines();
     this.updateInstances(this.centreMesh, centres ? this.centres : []);
     this.updateInstances(this.normalMesh, normals ? this.normals : []);
+  }
+
+  // Those of visible patches.
+  shownFootholds() {
+    const { risk } = this.result;
+    if (!this.soles || !this.options.soles) return [];
+    return this.soles.starts.flatMap((_, k) => (this.visible[risk.patchOf(k)] ? [k] : []));
+  }
+
+  updateSoles() {
+    if (!this.soles) return;
+    const index = this.shownFootholds().flatMap((k) => this.soles.triangles(k));
+    this.soleMesh.geometry.setIndex(index);
+    this.soleMesh.visible = index.length > 0;
   }
 
   updateLines() {
@@ -246,6 +290,10 @@ export class View {
       if (patches) lines.addOutline(this.patches, meshes, i, i === this.selected ? accent : dark);
       if (frames) lines.addFrame(this.result.centreOf(i), this.result.axesOf(i), 0.5 * meshes.reach[i]);
       if (normals && this.normals[i]) lines.add(this.result.centreOf(i), this.normals[i].centre, normalColor);
+    });
+    this.shownFootholds().forEach((k) => {
+      const isSelected = this.result.risk.patchOf(k) === this.selected;
+      lines.addSole(this.result.risk.soles[k], isSelected ? accent : [0.08, 0.08, 0.08]);
     });
     if (frames && view.seen) this.addSensorFrame(lines, view);
     const { geometry } = this.lines;

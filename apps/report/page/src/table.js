@@ -11,8 +11,7 @@ function wordColumns(result) {
     { name: 'type', label: 'type', word: true, value: (i) => result.typeOf(i).surface },
     { name: 'boundary', label: 'boundary', word: true, value: (i) => result.typeOf(i).boundary },
   ];
-  const states = (i) => [result.statusOf(i), result.verdictOf(i), ...result.flagsOf(i)]
-    .filter((word) => word && word !== 'accepted').map(spaced).join(', ');
+  const states = (i) => result.wordsOf(i).filter((word) => word !== 'accepted').map(spaced).join(', ');
   return { columns, last: { name: 'state', label: 'status', word: true, value: states } };
 }
 
