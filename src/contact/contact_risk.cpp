@@ -1,7 +1,6 @@
 #include <holdfast/contact/contact_risk.h>
 
 #include "contact/evaluation.h"
-#include <holdfast/geometry/constants.h>
 #include <holdfast/geometry/rotation.h>
 #include <holdfast/patch/boundary.h>
 
@@ -115,11 +114,10 @@ contactRisks(const ContactSurface& surface,
 {
   requireValid(validityError(placement));
   requireValid(yaws >= 1 ? "" : "a foot wants at least one yaw");
-  const contact::Sole sole(foot);
-  contact::Evaluation evaluation(surface, sole, placement);
+  contact::Evaluation evaluation(surface, foot, placement);
   std::vector<ContactRisk> risks;
-  for (int i = 0; i < yaws; ++i)
-    risks.push_back(evaluation.atYaw(2.0 * kPi * i / yaws));
+  for (const contact::Sole& sole : contact::inAllDirections(contact::Sole(foot), yaws))
+    risks.push_back(evaluation.at(sole));
   return risks;
 }
 
