@@ -97,8 +97,7 @@ keepApart(const std::vector<const Foothold*>& sorted,
 std::string
 validityError(const FootholdOptions& options)
 {
-  const double load = options.load_direction.norm();
-  if (!std::isfinite(load) || load == 0.0)
+  if (!options.load_direction.allFinite() || options.load_direction.isZero(0.0))
     return "the direction of the load must be finite and not zero";
   if (options.yaws < 1)
     return "at least one yaw must be tried";
