@@ -17,6 +17,19 @@ positiveNumber(const std::string& unit)
       unit);
 }
 
+CLI::Validator
+nonNegativeNumber(const std::string& unit)
+{
+  return CLI::Validator(
+      [](const std::string& text) {
+        const auto value = parseNumber<double>(text);
+        return value && std::isfinite(*value) && *value >= 0.0 ?
+                   std::string() :
+                   text + " is neither 0 nor a positive number";
+      },
+      unit);
+}
+
 void
 exclude(CLI::App& command,
         const std::string& option,

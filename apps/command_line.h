@@ -35,6 +35,9 @@ parseNumber(std::string_view text)
 /// Accepts positive finite numbers; `unit` is shown in the help.
 CLI::Validator positiveNumber(const std::string& unit);
 
+/// The same and zero.
+CLI::Validator nonNegativeNumber(const std::string& unit);
+
 /// Shortens what the help says behind each option to "VALUES [DEFAULT]". To be called
 /// when all options are there.
 void tidyHelp(CLI::App& command);

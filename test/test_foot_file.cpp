@@ -110,8 +110,11 @@ TEST_F(FootFile, HasThreeKindsOfSoles)
       with(rectangle, "  corners_m: [[0.1, 0], [-0.05, +0.04], [-0.05, -4e-2]]\n"));
   ASSERT_EQ(corners.sole.size(), 3u);
   EXPECT_EQ(corners.sole[1], Eigen::Vector2d(-0.05, 0.04));
+  const std::string ways = ": a sole is corners_m, radius_m, or length_m and width_m";
   EXPECT_EQ(errorOf(with(rectangle, rectangle + "  radius_m: 0.1\n")),
-            "3: sole.length_m is not a known key");
+            "3: sole.length_m goes without radius_m" + ways);
+  EXPECT_EQ(errorOf(with(rectangle, "  radius_m: 1\n  corners_m: [[0, 1]]\n")),
+            "3: sole.radius_m goes without corners_m" + ways);
 }
 
 TEST_F(FootFile, NamesTheLineAndTheKey)
@@ -131,6 +134,8 @@ TEST_F(FootFile, NamesTheLineAndTheKey)
             "3: sole.corners_m[1] must be a pair of finite numbers [x, y]");
   EXPECT_EQ(corners("[[0, 0], [1, 0, 0], [0, 1]]"),
             "3: sole.corners_m[1] must be a pair of finite numbers [x, y]");
+  EXPECT_EQ(corners("[[0, 0], [0.2, 0], [0.2, 5e-4]]"),
+            "2: sole makes no sense: a sole must be at least 1 mm long and wide");
   EXPECT_EQ(corners("all"), "3: sole.corners_m must be a list of pairs [x, y]");
   EXPECT_EQ(errorOf(with("3.5", ".inf")),
             "7: curvature.y_per_m must be a finite number");
@@ -139,10 +144,16 @@ TEST_F(FootFile, NamesTheLineAndTheKey)
   EXPECT_EQ(errorOf(with("mean: 0.6", "mean: -0.6")), "10: friction.mean must be > 0");
   EXPECT_EQ(errorOf(with("sigma: 0.1", "sigma: -0.1")),
             "11: friction.sigma must be >= 0");
+  EXPECT_EQ(errorOf(with("sigma: 0.1", "sigma: 0.7")),
+            "11: friction.sigma must not be above the mean");
   EXPECT_EQ(errorOf(with("sigma: 0.1", "sigma: .nan")),
             "11: friction.sigma must be a finite number");
   EXPECT_EQ(errorOf(with("  gap_m: 0.008\n", "  gap_m: -0.008\n")),
             "15: tolerances.gap_m must be > 0");
+  EXPECT_EQ(
+      errorOf(with("0.003", "0.009")),
+      "16: tolerances.contact_m must not be above gap_m: what is in contact would "
+      "be too far");
   EXPECT_EQ(errorOf(with("0.003", ".nan")),
             "16: tolerances.contact_m must be a finite number");
   EXPECT_EQ(errorOf(with("  tilt_rad: 0.1\n", "")),
@@ -161,11 +172,12 @@ TEST_F(FootFile, NamesTheLineAndTheKey)
 
 TEST_F(FootFile, LeavesTheTiltOutWithACompliantAnkle)
 {
-  const std::string text = with("stiff", "compliant");
+  std::string text = with("stiff", "compliant");
+  EXPECT_EQ(errorOf(text),
+            "14: tolerances.tilt_rad goes with ankle: stiff; a compliant one tilts "
+            "freely");
+  text.erase(text.find("  tilt_rad: 0.1\n"), 16);
   EXPECT_EQ(load(text).ankle, Ankle::Compliant);
-  std::string without = text;
-  without.erase(without.find("  tilt_rad: 0.1\n"), 16);
-  EXPECT_EQ(load(without).ankle, Ankle::Compliant);
   std::string flat = text;
   flat.erase(flat.find("curvature:"), flat.find("ankle:") - flat.find("curvature:"));
   EXPECT_EQ(load(flat).curvature, Eigen::Vector2d(0.0, 0.0));
@@ -182,6 +194,14 @@ TEST_F(FootFile, ComesWithExamples)
     EXPECT_EQ(validityError(foot), "");
   }
   EXPECT_NEAR(soleArea(loadFoot("humanoid_foot")), 0.02, 1e-12);
+  try {
+    loadFoot(HOLDFAST_SCRATCH_DIR);
+    FAIL();
+  }
+  catch (const std::runtime_error& error) {
+    EXPECT_EQ(std::string(error.what()),
+              "foot " HOLDFAST_SCRATCH_DIR ": is a folder, not a file");
+  }
   try {
     loadFoot("clown_shoe");
     FAIL();

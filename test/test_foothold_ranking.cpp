@@ -4,6 +4,7 @@
 #include "support/risk_map.h"
 
 #include <holdfast/contact/foothold.h>
+#include <holdfast/geometry/constants.h>
 
 #include <gtest/gtest.h>
 
@@ -59,8 +60,8 @@ TEST(FootholdRanking, PutsTheBetterFirst)
   for (std::size_t i = 1; i < footholds.size(); ++i) {
     const ContactQuality& a = *footholds[i - 1].risk.quality;
     const ContactQuality& b = *footholds[i].risk.quality;
-    const double before = std::floor(1e6 * a.risk.total);
-    const double after = std::floor(1e6 * b.risk.total);
+    const double before = std::round(1e6 * a.risk.total);
+    const double after = std::round(1e6 * b.risk.total);
     EXPECT_LE(before, after);
     if (before == after) {
       EXPECT_GE(a.contact_area_m2, b.contact_area_m2);
@@ -111,6 +112,47 @@ TEST(FootholdRanking, IsThatOfTheContactItself)
       if (other.quality) {
         EXPECT_GE(other.quality->risk.total, foothold.risk.quality->risk.total - 1e-4);
       }
+  }
+}
+
+// Most yaws are left out by bounds alone: none of them was the best.
+TEST(FootholdRanking, HasTheBestOfAllYaws)
+{
+  constexpr int kYaws = 16;
+  for (std::uint64_t run = 0; run < 5; ++run) {
+    Random random(run);
+    const PatchMap map = roughGround(8, kRadius, random);
+    const SurfacePrior prior = surfacePriorOf(map, -Eigen::Vector3d::UnitZ());
+    for (const MapPatch& patch : map.patches()) {
+      Foot foot = rectangularFoot(random.uniform(0.04, 0.09), 0.04);
+      foot.ankle = random.uniform(0.0, 1.0) < 0.5 ? Ankle::Stiff : Ankle::Compliant;
+      foot.tolerances.gap_m = std::pow(10.0, random.uniform(-4.0, -2.0));
+      const ContactSurface surface = contactSurfaceOf(map, patch, prior);
+      Placement placement;
+      placement.point = *middleOfSupport(surface);
+      const std::vector<ContactRisk> all =
+          contactRisks(surface, foot, placement, kYaws);
+      std::size_t best = 0;
+      for (std::size_t i = 1; i < all.size(); ++i) {
+        if (!all[i].quality || !all[best].quality) {
+          const bool has_more = all[i].support_share > all[best].support_share;
+          best = all[i].quality || (!all[best].quality && has_more) ? i : best;
+          continue;
+        }
+        const ContactQuality &a = *all[i].quality, &b = *all[best].quality;
+        const double more =
+            std::round(1e6 * a.risk.total) - std::round(1e6 * b.risk.total);
+        if (more < 0.0 || (more == 0.0 && a.contact_area_m2 > b.contact_area_m2))
+          best = i;
+      }
+      const ContactRisk found = bestYaw(surface, foot, placement, kYaws);
+      EXPECT_DOUBLE_EQ(placement.yaw, 2.0 * kPi * static_cast<double>(best) / kYaws);
+      EXPECT_EQ(found.support_share, all[best].support_share);
+      ASSERT_EQ(found.quality.has_value(), all[best].quality.has_value());
+      if (found.quality) {
+        EXPECT_EQ(found.quality->risk.total, all[best].quality->risk.total);
+      }
+    }
   }
 }
 

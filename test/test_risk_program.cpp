@@ -305,11 +305,48 @@ TEST_F(RiskProgram, NamesWhatIsWrongWithAFoot)
   expectFoot("contact_m: 0.003", "contact_m: .nan", "tolerances.contact_m must be");
   expectFoot("ankle: compliant", "ankle: stiff", "tolerances.tilt_rad is missing");
   expectFoot("ankle: compliant", "ankles: 2", "ankle is missing");
+  expectFoot("sigma: 0.15", "sigma: 0.8", "friction.sigma must not be above the mean");
+  expectFoot("  length_m: 0.2\n", "  length_m: 0.0002\n", "at least 1 mm");
+  expectFoot("contact_m: 0.003",
+             "contact_m: 0.01",
+             "contact_m must not be above gap_m");
+  expectFoot("  contact_m: 0.003\n",
+             "  contact_m: 0.003\n  tilt_rad: 0.1\n",
+             "tilt_rad goes with ankle: stiff");
+  expectFoot("  length_m: 0.2\n",
+             "  length_m: 0.2\n  radius_m: 0.1\n",
+             "length_m goes without radius_m");
+  expectError({kRocks, "--foot", folder_}, "is a folder, not a file");
   expectError({kRocks, "--foot", "flipper"}, "no built-in foot of that name");
+}
+
+// Of a direction the length does not count, however long or short.
+TEST_F(RiskProgram, TakesLoadsOfAnyLength)
+{
+  const auto pointed = [&](const std::string& y, const std::string& z) {
+    return rocks({"--load-direction", "0", y, z})["footholds"];
+  };
+  const Json footholds = pointed("0.75", "0.5");
+  EXPECT_FALSE(footholds.empty());
+  EXPECT_EQ(pointed("0.75e-300", "0.5e-300").size(), footholds.size());
+  EXPECT_EQ(pointed("0.75e300", "0.5e300").size(), footholds.size());
 }
 
 TEST_F(RiskProgram, NamesWhatIsWrongWithTheRest)
 {
+  const std::vector<std::string> cells{kRocks,
+                                       "--foot",
+                                       "point_foot",
+                                       "--quiet",
+                                       "--layers",
+                                       path("layers.pcd")};
+  std::vector<std::string> fine = cells;
+  fine.insert(fine.end(), {"--resolution", "1e-6"});
+  expectError(fine, "a --resolution of 1e-06 m makes more than 10 million cells");
+  EXPECT_NE(run({kRocks, "--foot", "point_foot", "--spacing", "-1"})
+                .err.find("--spacing: -1 is neither 0 nor a positive number"),
+            std::string::npos);
+
   expectError({kRocks, "--foot", "point_foot", "--load-direction", "0", "0", "0"},
               "the direction of the load must be finite and not zero");
   expectError({kRocks, "--foot", "point_foot", "--load-direction", "0", "nan", "0"},

@@ -48,6 +48,26 @@ noteLoad(const RiskReport& report)
                                                      "down where z is up"));
 }
 
+/// \throw std::runtime_error when the cells would be too many.
+RiskGrid
+layersOf(const RiskSettings& settings, const RiskReport& report)
+{
+  RiskGridOptions options;
+  options.resolution_m = settings.resolution_m;
+  options.yaws = std::max(1, report.options.yaws / 2);
+  options.load_direction = report.options.load_direction;
+  options.threads = report.options.threads;
+  try {
+    return riskGrid(report.ground.map, report.foot, options);
+  }
+  catch (const std::invalid_argument&) { // foot and load were good for the ranking
+    throw std::runtime_error(fmt::format(
+        "{}: a --resolution of {} m makes more than 10 million cells of what was seen",
+        settings.layers,
+        settings.resolution_m));
+  }
+}
+
 void
 writeFiles(const RiskSettings& settings, const RiskReport& report)
 {
@@ -60,14 +80,7 @@ writeFiles(const RiskSettings& settings, const RiskReport& report)
   }
   if (settings.layers.empty())
     return;
-  RiskGridOptions options;
-  options.resolution_m = settings.resolution_m;
-  options.yaws = std::max(1, report.options.yaws / 2);
-  options.load_direction = report.options.load_direction;
-  options.threads = report.options.threads;
-  writeLayers(settings.layers,
-              riskGrid(report.ground.map, report.foot, options),
-              report.ground.offset);
+  writeLayers(settings.layers, layersOf(settings, report), report.ground.offset);
 }
 
 /// Reads what is given, and ranks. What is wrong with an option is said before a cloud

@@ -64,7 +64,7 @@ addRankingOptions(CLI::App& command, RiskSettings& settings)
       .add_option("--spacing",
                   settings.footholds.spacing_m,
                   "Least distance between two footholds, metres; 0: every patch")
-      ->check(CLI::Validator(CLI::NonNegativeNumber).description("M"))
+      ->check(nonNegativeNumber("M"))
       ->type_name("")
       ->capture_default_str()
       ->group(group);

@@ -31,7 +31,7 @@ facingHint(const RiskReport& report)
 {
   constexpr double kFar = 0.35; // rad; a slope as steep is for climbing
   const Eigen::Vector3d faced = facedLoad(report.ground.map);
-  const Eigen::Vector3d taken = report.options.load_direction.normalized();
+  const Eigen::Vector3d taken = report.options.load_direction.stableNormalized();
   const double angle = std::atan2(faced.cross(taken).norm(), faced.dot(taken));
   if (!(angle > kFar))
     return "";

@@ -1,7 +1,6 @@
 #include <holdfast/contact/contact_risk.h>
 
 #include "contact/evaluation.h"
-#include <holdfast/geometry/constants.h>
 #include <holdfast/geometry/rotation.h>
 #include <holdfast/patch/boundary.h>
 
@@ -22,6 +21,13 @@ extentOf(const Patch& patch)
   for (int side = 0; side < 4; ++side)
     extent = std::max(extent, boundaryPoint(patch, side).norm());
   return extent;
+}
+
+/// Of any length that a number may have, whose square may be none.
+bool
+isDirection(const Eigen::Vector3d& v)
+{
+  return v.allFinite() && !v.isZero(0.0);
 }
 
 void
@@ -61,16 +67,14 @@ validityError(const Placement& placement)
 {
   if (!placement.point.allFinite())
     return "the point of a placement must be finite";
-  const double load = placement.load_direction.norm();
-  if (!std::isfinite(load) || load == 0.0)
+  if (!isDirection(placement.load_direction))
     return "the direction of the load must be finite and not zero";
   if (!std::isfinite(placement.yaw))
     return "the yaw of a placement must be finite";
-  if (placement.sole_normal &&
-      !(placement.sole_normal->norm() > 0.0 && placement.sole_normal->allFinite()))
+  if (placement.sole_normal && !isDirection(*placement.sole_normal))
     return "the normal of the sole must be finite and not zero";
-  if (placement.sole_normal &&
-      placement.sole_normal->dot(placement.load_direction) >= 0.0)
+  if (placement.sole_normal && placement.sole_normal->stableNormalized().dot(
+                                   placement.load_direction.stableNormalized()) >= 0.0)
     return "the normal of the sole must point against the load";
   return "";
 }
@@ -78,7 +82,7 @@ validityError(const Placement& placement)
 Pose
 loadFrame(const Placement& placement)
 {
-  const Eigen::Vector3d z = -placement.load_direction.normalized();
+  const Eigen::Vector3d z = -placement.load_direction.stableNormalized();
   // Within a quarter of a degree of the load the x axis has no direction across it.
   constexpr double kAlong = 0.99999;
   const Eigen::Vector3d forward =
@@ -115,11 +119,10 @@ contactRisks(const ContactSurface& surface,
 {
   requireValid(validityError(placement));
   requireValid(yaws >= 1 ? "" : "a foot wants at least one yaw");
-  const contact::Sole sole(foot);
-  contact::Evaluation evaluation(surface, sole, placement);
+  contact::Evaluation evaluation(surface, foot, placement);
   std::vector<ContactRisk> risks;
-  for (int i = 0; i < yaws; ++i)
-    risks.push_back(evaluation.atYaw(2.0 * kPi * i / yaws));
+  for (const contact::Sole& sole : contact::inAllDirections(contact::Sole(foot), yaws))
+    risks.push_back(evaluation.at(sole));
   return risks;
 }
 

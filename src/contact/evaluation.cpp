@@ -32,22 +32,16 @@ normalOf(const Eigen::Vector2d& slope)
   return Eigen::Vector3d(-slope.x(), -slope.y(), 1.0).normalized();
 }
 
-/// Off the sole by N(mean, sigma^2) at each of its places.
-struct Residuals {
-  Eigen::VectorXd mean, sigma;
-
-  Residuals(const SoleAtYaw& sole, const Field& field)
-  : mean(sole.rows * field.shapeMean() - sole.own)
-  , sigma((sole.rows * field.shapeFactor()).rowwise().norm())
-  {}
-};
-
 } // namespace
 
 FieldRisk::FieldRisk(const Field& field,
                      const Foot& foot,
                      const Eigen::Vector2d& planned_slope)
-: field_(field), foot_(foot), planned_slope_(planned_slope), lines_(field)
+: field_(field)
+, foot_(foot)
+, shape_mean_(field.shapeMean())
+, shape_root_(field.shapeRoot())
+, planned_slope_(planned_slope)
 {
   const Eigen::Vector2d slope = field.mean.segment<2>(1);
   const Eigen::Matrix2d covariance = field.slopeCovariance();
@@ -61,55 +55,101 @@ FieldRisk::FieldRisk(const Field& field,
                                          std::tan(foot.tolerances.tilt_rad));
 }
 
+GaussianShare
+FieldRisk::residual(const SolePlaces& places, Eigen::Index place) const
+{
+  const Eigen::Matrix<double, 1, kShape> row = places.rows.row(place);
+  return {1.0,
+          row.dot(shape_mean_) - places.own[place],
+          row.lazyProduct(shape_root_).norm()};
+}
+
+double
+FieldRisk::shareWithin(const SolePlaces& places, double limit) const
+{
+  double sum = 0.0;
+  for (Eigen::Index i = 0; i < places.size(); ++i) {
+    const GaussianShare off = residual(places, i);
+    sum += 1.0 - outsideProbability(off.mean, off.sigma, limit);
+  }
+  return sum / static_cast<double>(places.size());
+}
+
+FieldRisk::GapByPlace
+FieldRisk::gapByPlace(const SolePlaces& extremes) const
+{
+  GapByPlace gap;
+  for (Eigen::Index i = 0; i < extremes.size(); ++i) {
+    const GaussianShare off = residual(extremes, i);
+    const double p = outsideProbability(off.mean, off.sigma, foot_.tolerances.gap_m);
+    gap.sum += p;
+    if (p > gap.largest) {
+      gap.largest = p;
+      gap.leading = i;
+    }
+  }
+  return gap;
+}
+
+Range
+FieldRisk::totalWithin(const SolePlaces& extremes) const
+{
+  const GapByPlace gap = gapByPlace(extremes);
+  // As gapOf() has it.
+  return {totalWith(gap.sum < kNegligible ? gap.sum : gap.largest),
+          totalWith(gap.sum < kNegligible ? gap.sum : gap.most())};
+}
+
+double
+FieldRisk::total(const SolePlaces& extremes)
+{
+  return totalWith(gapOf(extremes));
+}
+
 ContactEvents
-FieldRisk::at(const SoleAtYaw& extremes)
+FieldRisk::at(const SolePlaces& extremes)
 {
   ContactEvents risk = common_;
   risk.gap = gapOf(extremes);
-  risk.total = risk.slip + risk.height + risk.tilt + risk.gap;
+  risk.total = totalWith(risk.gap);
   risk.joint = jointOf(risk, extremes);
   return risk;
 }
 
-double
-FieldRisk::gapOf(const SoleAtYaw& extremes)
+Lines&
+FieldRisk::lines()
 {
-  const double limit = foot_.tolerances.gap_m;
-  const Residuals off(extremes, field_);
-  double sum = 0.0, largest = -1.0;
-  Eigen::Index leading = 0;
-  for (Eigen::Index i = 0; i < off.mean.size(); ++i) {
-    const double p = outsideProbability(off.mean[i], off.sigma[i], limit);
-    sum += p;
-    if (p > largest) {
-      largest = p;
-      leading = i;
-    }
-  }
-  if (sum < kNegligible)
-    return sum;
-  lines_.setDirection(inField(extremes.rows.row(leading).transpose()));
-  lines_.keepShape(extremes.rows, extremes.own, limit);
-  return std::clamp(lines_.outside(), largest, std::max(largest, std::min(sum, 1.0)));
+  return lines_ ? *lines_ : lines_.emplace(field_);
 }
 
 double
-FieldRisk::jointOf(const ContactEvents& risk, const SoleAtYaw& extremes)
+FieldRisk::gapOf(const SolePlaces& extremes)
+{
+  const GapByPlace gap = gapByPlace(extremes);
+  if (gap.sum < kNegligible)
+    return gap.sum;
+  lines().setDirection(inField(extremes.rows.row(gap.leading).transpose()));
+  lines().keepShape(extremes.rows, extremes.own, foot_.tolerances.gap_m);
+  return std::clamp(lines().outside(), gap.largest, gap.most());
+}
+
+double
+FieldRisk::jointOf(const ContactEvents& risk, const SolePlaces& extremes)
 {
   const double slope = std::max(risk.slip, risk.tilt);
   const double largest = std::max({risk.height, risk.gap, slope});
   if (risk.total - largest <= kNegligible)
     return std::min(risk.total, 1.0);
   if (risk.gap < largest || risk.gap < kNegligible) {
-    lines_.setDirection(risk.height == largest ? FieldVector(FieldVector::Unit(0)) :
-                                                 steepest());
-    lines_.keepShape(extremes.rows, extremes.own, foot_.tolerances.gap_m);
+    lines().setDirection(risk.height == largest ? FieldVector(FieldVector::Unit(0)) :
+                                                  steepest());
+    lines().keepShape(extremes.rows, extremes.own, foot_.tolerances.gap_m);
   } // else the lines are as gapOf() has left them
-  lines_.keepHeight(foot_.tolerances.height_m);
-  lines_.keepFriction(foot_.friction);
+  lines().keepHeight(foot_.tolerances.height_m);
+  lines().keepFriction(foot_.friction);
   if (foot_.ankle == Ankle::Stiff)
-    lines_.keepSlope(planned_slope_, std::tan(foot_.tolerances.tilt_rad));
-  return std::clamp(lines_.outside(),
+    lines().keepSlope(planned_slope_, std::tan(foot_.tolerances.tilt_rad));
+  return std::clamp(lines().outside(),
                     largest,
                     std::max(largest, std::min(risk.total, 1.0)));
 }
@@ -125,10 +165,10 @@ FieldRisk::steepest() const
 }
 
 Evaluation::Evaluation(const ContactSurface& surface,
-                       const Sole& sole,
+                       const Foot& foot,
                        const Placement& placement)
 : surface_(surface)
-, sole_(sole)
+, foot_(foot)
 , load_(loadFrame(placement))
 , field_(fieldAt(surface, load_))
 {
@@ -142,36 +182,35 @@ Evaluation::Evaluation(const ContactSurface& surface,
 }
 
 ContactRisk
-Evaluation::atYaw(double turn)
+Evaluation::at(const Sole& sole)
 {
   ContactRisk result;
   if (!field_) {
     result.status = ContactStatus::NotFacingTheLoad;
     return result;
   }
-  result.support_share = supportShare(turn);
-  if (result.support_share < sole_.foot().tolerances.min_support)
+  result.support_share = supportShare(sole);
+  if (!isEnough(result.support_share))
     return result;
-  if (parts_.empty())
-    workOutParts();
 
   result.status = ContactStatus::Ok;
-  const SoleAtYaw extremes(sole_.extremes(surface_.isQuadric()), turn);
   ContactQuality& quality = result.quality.emplace();
   ContactEvents& risk = quality.risk;
-  risk = risksAt(extremes);
+  risk = risksAt(sole);
   risk.support = 1.0 - result.support_share;
   risk.total = std::min(risk.total + risk.support, 1.0);
   risk.joint = 1.0 - (1.0 - risk.joint) * result.support_share;
-  quality.cvar_gap_m = worstGap(extremes);
-  quality.contact_area_m2 = areaAt(turn);
-  placeSole(turn, quality);
+  quality.cvar_gap_m = worstGap(sole);
+  quality.contact_area_m2 = contactArea(sole);
+  placeSole(sole.turn(), quality);
   return result;
 }
 
-void
-Evaluation::workOutParts()
+std::vector<Evaluation::Part>&
+Evaluation::parts()
 {
+  if (!parts_.empty())
+    return parts_;
   // FieldRisk refers to the field beside it: no part may move any more.
   parts_.reserve(surface_.hypotheses.size() + 1);
   for (const SurfaceHypothesis& hypothesis : surface_.hypotheses)
@@ -184,34 +223,58 @@ Evaluation::workOutParts()
     sum += part.share;
   for (Part& part : parts_) {
     part.share /= sum;
-    part.risk.emplace(part.field, sole_.foot(), planned_slope_);
+    part.risk.emplace(part.field, foot_, planned_slope_);
   }
+  return parts_;
 }
 
 double
-Evaluation::supportShare(double turn) const
+Evaluation::supportShare(const Sole& sole) const
 {
-  const Eigen::Matrix2Xd& cells = sole_.cells().places;
+  const Eigen::Matrix2Xd& cells = sole.cells().places;
   const Pose to_anchor = surface_.anchor.inverse() * load_;
+  const double scale = 1.0 / surface_.radius_m;
+  const Eigen::Matrix<double, 2, 3> to_grid = scale * to_anchor.R.topRows<2>();
+  const Eigen::Vector2d origin = scale * to_anchor.c.head<2>();
   const JetVector jet = field_->mean.head<6>();
-  const Eigen::Matrix2d T = Eigen::Rotation2Dd(turn).toRotationMatrix();
   int on_support = 0;
   for (const Eigen::Vector2d cell : cells.colwise()) {
-    const Eigen::Vector2d p = T * cell;
-    const double height = jetBasis(p.x(), p.y()).dot(jet);
-    const Eigen::Vector3d q =
-        to_anchor.toWorld({p.x(), p.y(), height}) / surface_.radius_m;
+    const double height = jetBasis(cell.x(), cell.y()).dot(jet);
+    const Eigen::Vector2d q =
+        to_grid * Eigen::Vector3d(cell.x(), cell.y(), height) + origin;
     on_support += surface_.support.contains(q.x(), q.y()) ? 1 : 0;
   }
   return static_cast<double>(on_support) / static_cast<double>(cells.cols());
 }
 
+double
+Evaluation::total(const Sole& sole, double support_share)
+{
+  double total = 0.0;
+  for (Part& part : parts())
+    total += part.share * part.risk->total(extremesOf(sole));
+  return std::min(total + (1.0 - support_share), 1.0);
+}
+
+Range
+Evaluation::totalWithin(const Sole& sole, double support_share)
+{
+  Range total;
+  for (const Part& part : parts()) {
+    const Range one = part.risk->totalWithin(extremesOf(sole));
+    total.low += part.share * one.low;
+    total.high += part.share * one.high;
+  }
+  return {std::min(total.low + (1.0 - support_share), 1.0),
+          std::min(total.high + (1.0 - support_share), 1.0)};
+}
+
 ContactEvents
-Evaluation::risksAt(const SoleAtYaw& extremes)
+Evaluation::risksAt(const Sole& sole)
 {
   ContactEvents mean;
-  for (Part& part : parts_) {
-    const ContactEvents risk = part.risk->at(extremes);
+  for (Part& part : parts()) {
+    const ContactEvents risk = part.risk->at(extremesOf(sole));
     for (double ContactEvents::*event : {&ContactEvents::slip,
                                          &ContactEvents::height,
                                          &ContactEvents::tilt,
@@ -224,38 +287,35 @@ Evaluation::risksAt(const SoleAtYaw& extremes)
 }
 
 double
-Evaluation::worstGap(const SoleAtYaw& extremes) const
+Evaluation::worstGap(const Sole& sole)
 {
-  const Residuals overall(extremes, *field_);
+  const SolePlaces& extremes = extremesOf(sole);
+  const Eigen::VectorXd mean = extremes.rows * field_->shapeMean() - extremes.own;
+  const Eigen::VectorXd sigma = (extremes.rows * field_->shapeRoot()).rowwise().norm();
   Eigen::Index worst = 0;
-  (overall.mean.cwiseAbs() + 2.0 * overall.sigma).maxCoeff(&worst);
+  (mean.cwiseAbs() + 2.0 * sigma).maxCoeff(&worst);
   std::vector<GaussianShare> shares;
-  for (const Part& part : parts_) {
-    const Residuals off(extremes, part.field);
-    shares.push_back({part.share, off.mean[worst], off.sigma[worst]});
+  for (const Part& part : parts()) {
+    shares.push_back(part.risk->residual(extremes, worst));
+    shares.back().share = part.share;
   }
   return tailMean(shares, kWorst);
 }
 
 double
-Evaluation::areaAt(double turn) const
+Evaluation::contactArea(const Sole& sole)
 {
-  const SoleAtYaw cells(sole_.cells(), turn);
-  const double limit = sole_.foot().tolerances.contact_m;
   double share = 0.0;
-  for (const Part& part : parts_) {
-    const Residuals off(cells, part.field);
-    for (Eigen::Index i = 0; i < off.mean.size(); ++i)
-      share +=
-          part.share * (1.0 - outsideProbability(off.mean[i], off.sigma[i], limit));
-  }
-  return sole_.area() * share / static_cast<double>(cells.own.size());
+  for (const Part& part : parts())
+    share +=
+        part.share * part.risk->shareWithin(sole.cells(), foot_.tolerances.contact_m);
+  return sole.area() * share;
 }
 
 void
 Evaluation::placeSole(double turn, ContactQuality& quality) const
 {
-  const bool is_stiff = sole_.foot().ankle == Ankle::Stiff;
+  const bool is_stiff = foot_.ankle == Ankle::Stiff;
   const Eigen::Vector2d slope =
       is_stiff ? planned_slope_ : Eigen::Vector2d(field_->mean.segment<2>(1));
   const Eigen::Vector3d n = normalOf(slope); // frame of the load

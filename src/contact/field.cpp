@@ -89,15 +89,15 @@ allNodes()
   return nodes;
 }
 
-/// result = rows * nodes, without the packing that large products want.
-template <typename Factor>
+/// Rows of factor * nodes, without the packing that large products want.
 void
-multiply(const Factor& factor, const Lines::Nodes& nodes, Lines::Nodes& result)
+placeNumbers(const FieldMatrix& factor, int first, int end, Lines::Nodes& places)
 {
-  for (int i = 0; i < kField; ++i) {
-    auto row = result.row(i).array();
-    row = static_cast<float>(factor(i, 0)) * nodes.row(0).array();
-    for (int k = 1; k < kField; ++k)
+  const Lines::Nodes& nodes = allNodes().field;
+  for (int i = first; i < end; ++i) {
+    auto row = places.row(i).array();
+    row.setZero();
+    for (int k = 1; k < kField; ++k) // no node is along the first axis
       if (factor(i, k) != 0.0)
         row += static_cast<float>(factor(i, k)) * nodes.row(k).array();
   }
@@ -172,7 +172,7 @@ fieldAt(const ContactSurface& surface, const Pose& load)
 
 Lines::Lines(const Field& field) : field_(field)
 {
-  multiply(field.factor, allNodes().field, places_);
+  placeNumbers(field.factor, kShapeStart, kField, places_);
   setDirection(FieldVector::Unit(0));
 }
 
@@ -188,15 +188,33 @@ Lines::setDirection(const FieldVector& event)
   const FieldVector mirror =
       direction + (direction[0] > 0.0 ? 1.0 : -1.0) * FieldVector::Unit(0);
   const auto scaled = (mirror * (2.0 / mirror.squaredNorm())).cast<float>().eval();
-  Row feet = Row::Zero();
+  feet_.setZero();
   for (int k = 1; k < kField; ++k)
-    feet += scaled[k] * allNodes().field.row(k).array();
-  const auto step = (field_.factor * mirror).cast<float>().eval();
-  for (int i = 0; i < kField; ++i)
-    starts_.row(i) =
-        places_.row(i).array() - step[i] * feet + static_cast<float>(field_.mean[i]);
+    if (scaled[k] != 0.0F)
+      feet_ += scaled[k] * allNodes().field.row(k).array();
+  step_ = (field_.factor * mirror).cast<float>();
+  for (int i = kShapeStart; i < kField; ++i)
+    startNumber(i);
+  has_started_all_ = false;
   low_.setConstant(-kInfinity);
   high_.setConstant(kInfinity);
+}
+
+void
+Lines::startNumber(int number)
+{
+  starts_.row(number) = places_.row(number).array() - step_[number] * feet_ +
+                        static_cast<float>(field_.mean[number]);
+}
+
+void
+Lines::startHeightAndSlopes()
+{
+  if (!has_placed_all_)
+    placeNumbers(field_.factor, 0, kShapeStart, places_);
+  for (int i = 0; i < kShapeStart && !has_started_all_; ++i)
+    startNumber(i);
+  has_placed_all_ = has_started_all_ = true;
 }
 
 void
@@ -216,9 +234,12 @@ Lines::keepShape(const ShapeRows& rows, const Eigen::VectorXd& own, double limit
 {
   for (Eigen::Index i = 0; i < rows.rows(); ++i) {
     const Eigen::Matrix<float, 1, kShape> row = rows.row(i).cast<float>();
-    Row middle = row[0] * starts_.row(kShapeStart).array() - static_cast<float>(own[i]);
-    for (int k = 1; k < kShape; ++k)
-      middle += row[k] * starts_.row(kShapeStart + k).array();
+    const auto part = [&](int k) {
+      return row[k] * starts_.row(kShapeStart + k).array();
+    };
+    static_assert(kShape == 7, "one term for each");
+    const Row middle = part(0) + part(1) + part(2) + part(3) + part(4) + part(5) +
+                       part(6) - static_cast<float>(own[i]);
     keepWithin(middle, row.dot(along_.tail<kShape>()), static_cast<float>(limit));
   }
 }
@@ -226,12 +247,14 @@ Lines::keepShape(const ShapeRows& rows, const Eigen::VectorXd& own, double limit
 void
 Lines::keepHeight(double limit)
 {
+  startHeightAndSlopes();
   keepWithin(starts_.row(0).array(), along_[0], static_cast<float>(limit));
 }
 
 void
 Lines::keepSlopes(const Eigen::Vector2d& centre, const Row& limits)
 {
+  startHeightAndSlopes();
   // |start + w along - centre|^2 <= limit^2, with all divided by |along|.
   const Eigen::Vector2f slope = along_.segment<2>(1), from = centre.cast<float>();
   const float length = slope.norm();
@@ -268,10 +291,11 @@ Lines::keepFriction(const Friction& friction)
 double
 Lines::outside() const
 {
+  const NormalCdf& cdf = NormalCdf::table();
   double inside = 0.0;
   for (int n = 0; n < kLines; ++n)
     if (low_[n] < high_[n])
-      inside += normalCdf(high_[n]) - normalCdf(low_[n]);
+      inside += cdf.at(high_[n]) - cdf.at(low_[n]);
   return std::clamp(1.0 - inside / kLines, 0.0, 1.0);
 }
 

@@ -18,8 +18,11 @@ using FieldMatrix = Eigen::Matrix<double, kField, kField>;
 /// Its last numbers are the shape that shows under a sole.
 inline constexpr int kShapeStart = kField - kShape;
 
-/// field = mean + factor * z, z ~ N(0, I).
+/// field = mean + factor * z, z ~ N(0, I). What shows under a sole does not depend on
+/// the three numbers from kNotOfShape on.
 struct Field {
+  static constexpr int kNotOfShape = 3;
+
   FieldVector mean;
   FieldMatrix factor;
 
@@ -27,9 +30,13 @@ struct Field {
   {
     return mean.tail<kShape>();
   }
-  auto shapeFactor() const
+  /// What the shape has of the numbers it depends on.
+  ShapeMatrix shapeRoot() const
   {
-    return factor.bottomRows<kShape>();
+    ShapeMatrix root;
+    root << factor.bottomLeftCorner<kShape, kNotOfShape>(),
+        factor.bottomRightCorner<kShape, kShape - kNotOfShape>();
+    return root;
   }
   Eigen::Matrix2d slopeCovariance() const
   {
@@ -78,11 +85,16 @@ public:
 private:
   void keepWithin(const Row& middle, float along, float limit);
   void keepSlopes(const Eigen::Vector2d& centre, const Row& limits);
+  void startNumber(int number);
+  /// Height and slopes, which few events ask for, start where they are needed.
+  void startHeightAndSlopes();
 
   const Field& field_;
   Nodes places_; ///< factor * nodes
   Nodes starts_; ///< of the lines, in the field
-  Eigen::Matrix<float, kField, 1> along_;
+  Row feet_; ///< by how much the nodes are mirrored
+  Eigen::Matrix<float, kField, 1> along_, step_;
+  bool has_placed_all_ = false, has_started_all_ = false;
   Row low_, high_;
 };
 

@@ -72,6 +72,14 @@ soleError(const Foot& foot)
     return "the edges of a sole must not cross or touch each other";
   if (!(soleArea(foot) > 0.0))
     return "a sole must have an area";
+  constexpr double kLeast = 1e-3; // m; what is less was meant in another unit
+  Vector2d low = foot.sole.front(), high = low;
+  for (const Vector2d& corner : foot.sole) {
+    low = low.cwiseMin(corner);
+    high = high.cwiseMax(corner);
+  }
+  if (!((high - low).minCoeff() >= kLeast))
+    return "a sole must be at least 1 mm long and wide";
   return foot.curvature.allFinite() ? "" : "the curvature of a sole must be finite";
 }
 
@@ -96,6 +104,8 @@ validityError(const Foot& foot)
     return "friction must have a mean > 0";
   if (!std::isfinite(foot.friction.sigma) || foot.friction.sigma < 0.0)
     return "the sigma of friction must not be negative";
+  if (foot.friction.sigma > foot.friction.mean)
+    return "the sigma of friction must not be above its mean";
   if (!isPositive(t.height_m) || !isPositive(t.gap_m) || !isPositive(t.contact_m))
     return "tolerances of height, gap and contact must be > 0";
   // From 1.5 rad on its tangent is beyond any slope that a patch can have.

@@ -1,66 +1,14 @@
 #include <holdfast/contact/foothold.h>
 
 #include "contact/best_yaw.h"
-#include "contact/evaluation.h"
 #include "parallel/parallel_for.h"
-#include <holdfast/geometry/constants.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <stdexcept>
-#include <utility>
 
 namespace holdfast {
-namespace contact {
-namespace {
-
-/// Differences of totals below it decide nothing: no foot is safer for them.
-constexpr double kTotalStep = 1e-6;
-
-double
-stepsOf(const ContactQuality& quality)
-{
-  return std::floor(quality.risk.total / kTotalStep);
-}
-
-} // namespace
-
-bool
-isBetter(const ContactRisk& one, const ContactRisk& other)
-{
-  if (!one.quality || !other.quality)
-    return one.quality.has_value() && !other.quality.has_value();
-  const double a = stepsOf(*one.quality), b = stepsOf(*other.quality);
-  return a != b ? a < b : one.quality->contact_area_m2 > other.quality->contact_area_m2;
-}
-
-ContactRisk
-atBestYaw(const ContactSurface& surface,
-          const Sole& sole,
-          Placement& placement,
-          int yaws)
-{
-  Evaluation evaluation(surface, sole, placement);
-  ContactRisk best;
-  double best_turn = 0.0;
-  for (int i = 0; i < yaws; ++i) {
-    const double turn = 2.0 * kPi * i / yaws;
-    ContactRisk risk = evaluation.atYaw(turn);
-    // Without enough support, the share that is nearest to it says most.
-    const bool is_nearer =
-        !risk.quality && !best.quality && risk.support_share > best.support_share;
-    if (i == 0 || is_nearer || isBetter(risk, best)) {
-      best = std::move(risk);
-      best_turn = turn;
-    }
-  }
-  placement.yaw += best_turn;
-  return best;
-}
-
-} // namespace contact
-
 namespace {
 
 void
@@ -105,7 +53,7 @@ middleInPlane(const SupportGrid& support)
 Foothold
 tried(const MapPatch& patch,
       const ContactSurface& surface,
-      const contact::Sole& sole,
+      const std::vector<contact::Sole>& soles,
       const FootholdOptions& options)
 {
   Foothold foothold;
@@ -117,7 +65,7 @@ tried(const MapPatch& patch,
   if (!middle)
     return foothold;
   foothold.placement.point = *middle;
-  foothold.risk = contact::atBestYaw(surface, sole, foothold.placement, options.yaws);
+  foothold.risk = contact::atBestYaw(surface, soles, foothold.placement);
   return foothold;
 }
 
@@ -149,8 +97,7 @@ keepApart(const std::vector<const Foothold*>& sorted,
 std::string
 validityError(const FootholdOptions& options)
 {
-  const double load = options.load_direction.norm();
-  if (!std::isfinite(load) || load == 0.0)
+  if (!options.load_direction.allFinite() || options.load_direction.isZero(0.0))
     return "the direction of the load must be finite and not zero";
   if (options.yaws < 1)
     return "at least one yaw must be tried";
@@ -176,7 +123,8 @@ rankFootholds(const PatchMap& map, const Foot& foot, const FootholdOptions& opti
 {
   requireValid(validityError(foot));
   requireValid(validityError(options));
-  const contact::Sole sole(foot);
+  const std::vector<contact::Sole> soles =
+      contact::inAllDirections(contact::Sole(foot), options.yaws);
   const SurfacePrior prior = surfacePriorOf(map, options.load_direction);
   const std::vector<MapPatch>& patches = map.patches();
   FootholdRanking ranking;
@@ -185,7 +133,7 @@ rankFootholds(const PatchMap& map, const Foot& foot, const FootholdOptions& opti
   parallelFor(ranking.candidates, options.threads, [&](int item, int) {
     const auto i = static_cast<std::size_t>(item);
     const ContactSurface surface = contactSurfaceOf(map, patches[i], prior);
-    ranking.tried[i] = tried(patches[i], surface, sole, options);
+    ranking.tried[i] = tried(patches[i], surface, soles, options);
   });
 
   std::vector<const Foothold*> possible;
@@ -221,7 +169,9 @@ bestYaw(const ContactSurface& surface, const Foot& foot, Placement& placement, i
     throw std::invalid_argument("holdfast::bestYaw: " + error);
   if (yaws < 1)
     throw std::invalid_argument("holdfast::bestYaw: at least one yaw must be tried");
-  return contact::atBestYaw(surface, contact::Sole(foot), placement, yaws);
+  return contact::atBestYaw(surface,
+                            contact::inAllDirections(contact::Sole(foot), yaws),
+                            placement);
 }
 
 } // namespace holdfast

@@ -13,43 +13,6 @@
 namespace holdfast::contact {
 namespace {
 
-/// Cubic Hermite interpolation over [-kReach, kReach]: its error is at most
-/// step^4 / 384 times the largest fourth derivative, 1.4: 6e-8.
-class CdfTable {
-public:
-  static constexpr int kPerUnit = 16, kReach = 8, kNodes = 2 * kReach * kPerUnit + 1;
-
-  CdfTable()
-  {
-    for (int i = 0; i < kNodes; ++i) {
-      const double x = static_cast<double>(i) / kPerUnit - kReach;
-      nodes_[static_cast<std::size_t>(i)] = {0.5 * std::erfc(-x / std::sqrt(2.0)),
-                                             normalDensity(x) / kPerUnit};
-    }
-  }
-
-  double at(double x) const
-  {
-    if (!(x > -kReach))
-      return 0.0;
-    if (x >= kReach)
-      return 1.0;
-    const double scaled = (x + kReach) * kPerUnit;
-    const int i = static_cast<int>(scaled);
-    const double t = scaled - i, u = 1.0 - t;
-    const Node& a = nodes_[static_cast<std::size_t>(i)];
-    const Node& b = nodes_[static_cast<std::size_t>(i) + 1];
-    return u * u * ((1.0 + 2.0 * t) * a.value + t * a.slope) +
-           t * t * ((3.0 - 2.0 * t) * b.value - u * b.slope);
-  }
-
-private:
-  struct Node {
-    double value, slope;
-  };
-  std::array<Node, kNodes> nodes_;
-};
-
 using Gauss24 = boost::math::quadrature::gauss<double, 24>;
 
 /// Gauss-Legendre over [low, high].
@@ -65,6 +28,40 @@ integrate(double low, double high, const Function& f)
   }
   return half * sum;
 }
+
+/// Gauss-Hermite rules of up to kMost nodes: E[f(z)], z ~ N(0, 1), is the sum of
+/// weights times f at the nodes.
+class HermiteRules {
+public:
+  static constexpr int kMost = 24;
+
+  struct Rule {
+    Eigen::VectorXd nodes, weights;
+  };
+
+  static const Rule& of(int nodes)
+  {
+    static const HermiteRules all;
+    return all.rules_[static_cast<std::size_t>(nodes)];
+  }
+
+private:
+  /// From the recursion of the polynomials (Golub and Welsch, Math. Comp. 23, 1969).
+  HermiteRules()
+  {
+    for (int n = 1; n <= kMost; ++n) {
+      const Eigen::VectorXd beside =
+          Eigen::VectorXd::LinSpaced(n - 1, 1.0, n - 1.0).cwiseSqrt();
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver;
+      solver.computeFromTridiagonal(Eigen::VectorXd::Zero(n), beside);
+      rules_[static_cast<std::size_t>(n)] = {
+          solver.eigenvalues(),
+          solver.eigenvectors().row(0).cwiseAbs2().transpose()};
+    }
+  }
+
+  std::array<Rule, kMost + 1> rules_;
+};
 
 /// Standard deviations below this are those of numbers that are known: slopes are told
 /// to 1e-4 at best.
@@ -118,29 +115,57 @@ slipOverFriction(const Principal& g, const LogFriction& mu)
   return integrate(-kTail, kTail, density);
 }
 
+/// E[f(z)], z ~ N(0, 1).
+/// \param step of z, over the length in which f rises like Phi.
+template <typename Function>
+double
+normalMean(double step, const Function& f)
+{
+  // The error for Phi(step z) is less than (step^2 / 2)^nodes.
+  constexpr double kError = 1e-9;
+  const double nodes = std::log(kError) / std::log(0.5 * step * step);
+  if (!(step < 1.0 && nodes <= HermiteRules::kMost))
+    return integrate(-kTail, kTail, [&](double z) { return normalDensity(z) * f(z); });
+  const HermiteRules::Rule& rule =
+      HermiteRules::of(std::max(1, static_cast<int>(std::ceil(nodes))));
+  double sum = 0.0;
+  for (Eigen::Index i = 0; i < rule.nodes.size(); ++i)
+    sum += rule.weights[i] * f(rule.nodes[i]);
+  return sum;
+}
+
 /// The same as the mean over g: smooth where mu is known worse.
 double
 slipOverSlope(const Principal& g, const LogFriction& mu)
 {
-  const auto along = [&](double u) {
+  // Where its density is largest the distribution of mu is steepest.
+  const double length = mu.sigma * std::exp(mu.mean - mu.sigma * mu.sigma);
+  return normalMean(g.sigma[0] / length, [&](double u) {
     const double x = g.mean[0] + g.sigma[0] * u;
-    const auto across = [&](double v) {
+    return normalMean(g.sigma[1] / length, [&](double v) {
       const double y = g.mean[1] + g.sigma[1] * v;
-      const double slope = std::max(std::hypot(x, y), kKnown);
-      return normalDensity(v) * normalCdf((std::log(slope) - mu.mean) / mu.sigma);
-    };
-    return normalDensity(u) * integrate(-kTail, kTail, across);
-  };
-  return integrate(-kTail, kTail, along);
+      const double slope = std::max(std::sqrt(x * x + y * y), kKnown);
+      return normalCdf((std::log(slope) - mu.mean) / mu.sigma);
+    });
+  });
 }
 
 } // namespace
 
-double
-normalCdf(double x)
+NormalCdf::NormalCdf()
 {
-  static const CdfTable table;
-  return table.at(x);
+  for (int i = 0; i < kNodes; ++i) {
+    const double x = static_cast<double>(i) / kPerUnit - kReach;
+    nodes_[static_cast<std::size_t>(i)] = {0.5 * std::erfc(-x / std::sqrt(2.0)),
+                                           normalDensity(x) / kPerUnit};
+  }
+}
+
+const NormalCdf&
+NormalCdf::table()
+{
+  static const NormalCdf table;
+  return table;
 }
 
 double

@@ -93,7 +93,7 @@ limitedNormal(const Eigen::Vector2d& slope, double max_tilt_rad)
 /// Probability that the surface is somewhere beyond [low, high] above the lifted pad.
 double
 beyond(const contact::Field& field,
-       const contact::SoleAtYaw& pad,
+       const contact::SolePlaces& pad,
        const Misfit& misfit,
        double low,
        double high)
@@ -112,13 +112,11 @@ beyond(const contact::Field& field,
 void
 addRisks(const contact::Field& field,
          double share,
-         const contact::Sole& pad,
-         double turn,
+         const contact::SolePlaces& extremes,
          const Misfit& misfit,
          const PatchContactOptions& options,
          PatchFitness& fitness)
 {
-  const contact::SoleAtYaw extremes(pad.extremes(false), turn);
   // Farther than anything a pad meets, and near enough for single precision.
   constexpr double kFar = 1.0;
   const double gap = options.max_gap_m, in = options.max_penetration_m;
@@ -176,7 +174,7 @@ patchContact(const ContactSurface& surface,
   Placement tilted = placement;
   tilted.point = load.toWorld({0.0, 0.0, field->mean[0]});
   tilted.load_direction = -(load.R * n);
-  const contact::Evaluation evaluation(surface, sole, tilted);
+  const contact::Evaluation evaluation(surface, pad, tilted);
   const Pose plane = loadFrame(tilted);
   const auto seen = contact::fieldAt(surface, plane);
   if (!seen) {
@@ -184,7 +182,8 @@ patchContact(const ContactSurface& surface,
     return result;
   }
   const double turn = bestTurn(sole, *seen, options);
-  result.support_share = evaluation.supportShare(turn);
+  const contact::Sole turned = sole.turned(turn);
+  result.support_share = evaluation.supportShare(turned);
   if (result.support_share < pad.tolerances.min_support)
     return result;
 
@@ -198,10 +197,15 @@ patchContact(const ContactSurface& surface,
   Misfit extremes(sole.extremes(false), *seen, turn, options);
   extremes.lift = cells.lift;
   if (surface.hypotheses.empty())
-    addRisks(*seen, 1.0, sole, turn, extremes, options, fitness);
+    addRisks(*seen, 1.0, turned.extremes(false), extremes, options, fitness);
   for (const SurfaceHypothesis& hypothesis : surface.hypotheses)
     if (const auto one = contact::fieldAt(surface, hypothesis, plane))
-      addRisks(*one, hypothesis.share, sole, turn, extremes, options, fitness);
+      addRisks(*one,
+               hypothesis.share,
+               turned.extremes(false),
+               extremes,
+               options,
+               fitness);
   return result;
 }
 

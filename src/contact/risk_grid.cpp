@@ -240,7 +240,7 @@ setRisk(const ContactRisk& risk, double yaw, Cell& cell)
 Cell
 cellAt(const ContactSurface& surface,
        const Eigen::Vector3d& in_grid,
-       const contact::Sole& sole,
+       const std::vector<contact::Sole>& soles,
        const RiskGridOptions& options)
 {
   Cell cell;
@@ -255,7 +255,7 @@ cellAt(const ContactSurface& surface,
   setSurface(*field, in_grid.z(), cell);
   // The sole is planned where the surface is expected.
   placement.point = load.toWorld({0.0, 0.0, field->mean[0]});
-  const ContactRisk risk = contact::atBestYaw(surface, sole, placement, options.yaws);
+  const ContactRisk risk = contact::atBestYaw(surface, soles, placement);
   setRisk(risk, placement.yaw, cell);
   return cell;
 }
@@ -300,7 +300,8 @@ riskGrid(const PatchMap& map, const Foot& foot, const RiskGridOptions& options)
 {
   requireValid(validityError(foot));
   requireValid(validityError(options));
-  const contact::Sole sole(foot);
+  const std::vector<contact::Sole> soles =
+      contact::inAllDirections(contact::Sole(foot), options.yaws);
   Placement level;
   level.load_direction = options.load_direction;
   const Eigen::Matrix3d axes = loadFrame(level).R;
@@ -323,7 +324,7 @@ riskGrid(const PatchMap& map, const Foot& foot, const RiskGridOptions& options)
         continue;
       Eigen::Vector3d in_grid;
       in_grid << grid.position(row, column), choice.elevation();
-      const Cell cell = cellAt(*choice.patch(), in_grid, sole, options);
+      const Cell cell = cellAt(*choice.patch(), in_grid, soles, options);
       for (std::size_t layer = 0; layer < kLayers; ++layer)
         grid.data[layer][index] = cell[layer];
     }

@@ -4,7 +4,10 @@
 #include "geometry/polygon.h"
 #include "geometry/symmetric.h"
 
+#include <holdfast/geometry/constants.h>
+
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 
 #include <cmath>
 #include <cstddef>
@@ -161,6 +164,28 @@ Sole::placesAt(const Matrix2Xd& places) const
   own[2] = foot_.curvature.y();
   result.own = result.rows * own;
   return result;
+}
+
+Sole
+Sole::turned(double angle) const
+{
+  Sole result = *this;
+  result.turn_ += angle;
+  const Eigen::Matrix2d W = Eigen::Rotation2Dd(angle).toRotationMatrix();
+  for (SolePlaces* all : {&result.cells_, &result.extremes_, &result.even_extremes_}) {
+    all->places = W * all->places;
+    all->rows = turnedRows(all->rows, angle);
+  }
+  return result;
+}
+
+std::vector<Sole>
+inAllDirections(const Sole& sole, int yaws)
+{
+  std::vector<Sole> all;
+  for (int i = 0; i < yaws; ++i)
+    all.push_back(sole.turned(2.0 * kPi * i / yaws));
+  return all;
 }
 
 ShapeRows

@@ -5,6 +5,8 @@
 
 #include <Eigen/Core>
 
+#include <vector>
+
 namespace holdfast::contact {
 
 /// What of a surface shows under a sole: [kxx kxy kyy | xxx xxy xyy yyy], its second
@@ -29,11 +31,21 @@ struct SolePlaces {
   }
 };
 
-/// What does not depend on where a foot is put.
+/// What does not depend on where a foot is put, in one direction.
 class Sole {
 public:
   /// \throw std::invalid_argument when the foot makes no sense.
   explicit Sole(const Foot& foot);
+
+  /// The same, turned by an angle about the load: places and rows are in the axes from
+  /// which it is turned, rows for shapes in those axes.
+  Sole turned(double angle) const;
+
+  /// By how much it was turned, rad.
+  double turn() const
+  {
+    return turn_;
+  }
 
   const Foot& foot() const
   {
@@ -63,12 +75,15 @@ private:
   SolePlaces placesAt(const Eigen::Matrix2Xd& places) const;
 
   Foot foot_;
-  double area_ = 0.0;
+  double area_ = 0.0, turn_ = 0.0;
   Eigen::Matrix<double, 3, kShape> planes_; ///< nearest to each term of a shape
   SolePlaces cells_, extremes_, even_extremes_;
 };
 
 /// Rows for shapes in axes from which those of the sole are turned by an angle.
 ShapeRows turnedRows(const ShapeRows& rows, double angle);
+
+/// A sole in so many directions over a full turn, the first as it is.
+std::vector<Sole> inAllDirections(const Sole& sole, int yaws);
 
 } // namespace holdfast::contact

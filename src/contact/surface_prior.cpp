@@ -13,33 +13,32 @@
 namespace holdfast {
 namespace {
 
-/// What kinds of surface differ in: [gx gy | kxx kxy kyy], the slope against the load
-/// and the curvatures.
+/// What kinds of surface differ in: [gx gy | u v w], the slope against the load and the
+/// curvatures xx xy yy in coordinates in which those of a kind are independent and of
+/// one variance.
 using Traits = Eigen::Matrix<double, 5, 1>;
 using TraitsMatrix = Eigen::Matrix<double, 5, 5>;
 
-/// Covariance of xx xy yy for second derivatives of variance one.
+/// [u v w] of xx xy yy: the inverse root of their covariance for second derivatives of
+/// variance one, [1 0 1/3; 0 1/3 0; 1/3 0 1].
 const Eigen::Matrix3d&
-unitSecondDerivatives()
+independentCurvatures()
 {
-  // clang-format off
-  static const Eigen::Matrix3d S = (Eigen::Matrix3d() <<
-      1.0, 0.0, 1.0 / 3.0,
-      0.0, 1.0 / 3.0, 0.0,
-      1.0 / 3.0, 0.0, 1.0).finished();
-  // clang-format on
-  return S;
+  static const Eigen::Matrix3d T = [] {
+    Eigen::Matrix3d S;
+    S << 1.0, 0.0, 1.0 / 3.0, 0.0, 1.0 / 3.0, 0.0, 1.0 / 3.0, 0.0, 1.0;
+    return Eigen::Matrix3d(S.llt().matrixL().solve(Eigen::Matrix3d::Identity()));
+  }();
+  return T;
 }
 
-TraitsMatrix
-covarianceOf(const SurfaceKind& kind)
+/// Of the traits of a kind, which are independent.
+Traits
+variancesOf(const SurfaceKind& kind)
 {
-  TraitsMatrix B = TraitsMatrix::Zero();
-  B.topLeftCorner<2, 2>().setIdentity();
-  B.topLeftCorner<2, 2>() *= kind.slope * kind.slope;
-  B.bottomRightCorner<3, 3>() =
-      kind.curvature_per_m * kind.curvature_per_m * unitSecondDerivatives();
-  return B;
+  const double slope = kind.slope * kind.slope;
+  const double curvature = kind.curvature_per_m * kind.curvature_per_m;
+  return (Traits() << slope, slope, curvature, curvature, curvature).finished();
 }
 
 /// What a patch tells of its kind.
@@ -62,9 +61,10 @@ struct Evidence {
   /// Gaussian numbers, some two thirds of their squared mean.
   double roughnessVariance(const SurfaceKind& kind) const
   {
+    const double squared = kind.s3_per_m2 * kind.s3_per_m2;
     return 2.0 * std::max(chi2_expected, 1.0) /
                (chi2_per_roughness * chi2_per_roughness) +
-           2.0 / 3.0 * std::pow(kind.s3_per_m2, 4);
+           2.0 / 3.0 * squared * squared;
   }
 };
 
@@ -82,9 +82,9 @@ evidenceOf(const MapPatch& patch, const Eigen::Vector3d& load_direction)
   if (!moved || !moved->value.allFinite())
     return std::nullopt;
   Evidence e;
-  e.traits << moved->value.segment<2>(1), patch.jet.value().tail<3>();
-  e.by_jet << moved->by_jet.middleRows<2>(1), Eigen::Matrix3d::Zero(),
-      Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d& T = independentCurvatures();
+  e.traits << moved->value.segment<2>(1), T * patch.jet.value().tail<3>();
+  e.by_jet << moved->by_jet.middleRows<2>(1), Eigen::Matrix3d::Zero(), T;
   e.covariance = e.by_jet * patch.jet.covariance() * e.by_jet.transpose();
   e.chi2 = patch.chi2;
   e.chi2_expected = patch.chi2_expected;
@@ -92,24 +92,66 @@ evidenceOf(const MapPatch& patch, const Eigen::Vector3d& load_direction)
   return e;
 }
 
+/// L^-1 of a positive definite S = L L^T. Every patch is weighed against every kind
+/// dozens of times: a general factorization takes several times as long.
+TraitsMatrix
+inverseRoot(const TraitsMatrix& S)
+{
+  constexpr int n = TraitsMatrix::RowsAtCompileTime;
+  TraitsMatrix L = TraitsMatrix::Zero(), inverse = TraitsMatrix::Zero();
+  for (int j = 0; j < n; ++j) {
+    double pivot = S(j, j);
+    for (int k = 0; k < j; ++k)
+      pivot -= L(j, k) * L(j, k);
+    inverse(j, j) = 1.0 / std::sqrt(pivot);
+    for (int i = j + 1; i < n; ++i) {
+      double sum = S(i, j);
+      for (int k = 0; k < j; ++k)
+        sum -= L(i, k) * L(j, k);
+      L(i, j) = sum * inverse(j, j);
+    }
+    for (int c = 0; c < j; ++c) { // row j of L L^-1 = I
+      double sum = 0.0;
+      for (int k = c; k < j; ++k)
+        sum += L(j, k) * inverse(k, c);
+      inverse(j, c) = -sum * inverse(j, j);
+    }
+  }
+  return inverse;
+}
+
 /// What a patch of a kind is expected to be.
 struct Posterior {
   double log_likelihood = 0.0;
+  Traits prior; ///< variances of the kind
+  TraitsMatrix inverse_root; ///< of the covariance with which traits are measured
   Traits traits;
-  TraitsMatrix covariance;
+
+  /// prior - prior S^-1 prior, its diagonal.
+  Traits variances() const
+  {
+    const Traits squared = inverse_root.colwise().squaredNorm().transpose();
+    return prior - prior.cwiseProduct(prior).cwiseProduct(squared);
+  }
+  TraitsMatrix covariance() const
+  {
+    const TraitsMatrix known = inverse_root * prior.asDiagonal();
+    return TraitsMatrix(prior.asDiagonal()) - known.transpose() * known;
+  }
 };
 
 Posterior
 posteriorOf(const Evidence& e, const SurfaceKind& kind, double noise_scale)
 {
-  const TraitsMatrix B = covarianceOf(kind);
-  const Eigen::LLT<TraitsMatrix> S(B + e.covariance);
-  const TraitsMatrix gain = S.solve(B).transpose();
   Posterior p;
-  p.traits = gain * e.traits;
-  p.covariance = B - gain * B;
-  p.log_likelihood = -0.5 * e.traits.dot(S.solve(e.traits)) -
-                     S.matrixLLT().diagonal().array().log().sum();
+  p.prior = variancesOf(kind);
+  TraitsMatrix S = e.covariance;
+  S.diagonal() += p.prior;
+  p.inverse_root = inverseRoot(S);
+  const Traits normal = p.inverse_root * e.traits;
+  p.traits = p.prior.cwiseProduct(p.inverse_root.transpose() * normal);
+  p.log_likelihood =
+      std::log(p.inverse_root.diagonal().prod()) - 0.5 * normal.squaredNorm();
   if (e.hasRoughness()) {
     const double variance = e.roughnessVariance(kind);
     const double off = e.roughness(noise_scale) - kind.s3_per_m2 * kind.s3_per_m2;
@@ -118,14 +160,26 @@ posteriorOf(const Evidence& e, const SurfaceKind& kind, double noise_scale)
   return p;
 }
 
+void
+posteriorsOf(const Evidence& e,
+             const SurfacePrior& prior,
+             std::vector<Posterior>& posteriors)
+{
+  posteriors.clear();
+  for (const SurfaceKind& kind : prior.kinds)
+    posteriors.push_back(posteriorOf(e, kind, prior.noise_scale));
+}
+
 /// How likely each kind is, by a patch.
-std::vector<double>
-sharesOf(const std::vector<Posterior>& posteriors, const SurfacePrior& prior)
+void
+sharesOf(const std::vector<Posterior>& posteriors,
+         const SurfacePrior& prior,
+         std::vector<double>& shares)
 {
   double highest = posteriors.front().log_likelihood;
   for (const Posterior& p : posteriors)
     highest = std::max(highest, p.log_likelihood);
-  std::vector<double> shares;
+  shares.clear();
   double sum = 0.0;
   for (std::size_t c = 0; c < posteriors.size(); ++c) {
     shares.push_back(prior.kinds[c].share *
@@ -134,16 +188,6 @@ sharesOf(const std::vector<Posterior>& posteriors, const SurfacePrior& prior)
   }
   for (double& share : shares)
     share /= sum;
-  return shares;
-}
-
-std::vector<Posterior>
-posteriorsOf(const Evidence& e, const SurfacePrior& prior)
-{
-  std::vector<Posterior> posteriors;
-  for (const SurfaceKind& kind : prior.kinds)
-    posteriors.push_back(posteriorOf(e, kind, prior.noise_scale));
-  return posteriors;
 }
 
 /// Flatter is nothing that a camera tells.
@@ -167,12 +211,10 @@ struct KindSums {
            const SurfaceKind& kind,
            double noise_scale)
   {
-    const TraitsMatrix second = p.covariance + p.traits * p.traits.transpose();
+    const Traits squares = p.variances() + p.traits.cwiseProduct(p.traits);
     share += share_of;
-    squared_slope += share_of * second.topLeftCorner<2, 2>().trace() / 2.0;
-    const Eigen::Matrix3d curvatures = second.bottomRightCorner<3, 3>();
-    squared_curvature +=
-        share_of * unitSecondDerivatives().llt().solve(curvatures).trace() / 3.0;
+    squared_slope += share_of * squares.head<2>().mean();
+    squared_curvature += share_of * squares.tail<3>().mean();
     if (e.hasRoughness()) {
       const double w = share_of / e.roughnessVariance(kind);
       weight += w;
@@ -200,9 +242,11 @@ void
 improve(const std::vector<Evidence>& evidence, SurfacePrior& prior)
 {
   std::vector<KindSums> sums(prior.kinds.size());
+  std::vector<Posterior> posteriors;
+  std::vector<double> shares;
   for (const Evidence& e : evidence) {
-    const std::vector<Posterior> posteriors = posteriorsOf(e, prior);
-    const std::vector<double> shares = sharesOf(posteriors, prior);
+    posteriorsOf(e, prior, posteriors);
+    sharesOf(posteriors, prior, shares);
     for (std::size_t c = 0; c < sums.size(); ++c)
       sums[c].add(shares[c], e, posteriors[c], prior.kinds[c], prior.noise_scale);
   }
@@ -285,8 +329,10 @@ contactSurfaceOf(const PatchMap& map, const MapPatch& patch, const SurfacePrior&
   if (!evidence)
     return surface;
 
-  const std::vector<Posterior> posteriors = posteriorsOf(*evidence, prior);
-  const std::vector<double> shares = sharesOf(posteriors, prior);
+  std::vector<Posterior> posteriors;
+  std::vector<double> shares;
+  posteriorsOf(*evidence, prior, posteriors);
+  sharesOf(posteriors, prior, shares);
   // How the jet follows its traits.
   const JetMatrix P = surface.jet.white;
   const Eigen::Matrix<double, 6, 5> follow =
@@ -294,15 +340,14 @@ contactSurfaceOf(const PatchMap& map, const MapPatch& patch, const SurfacePrior&
           .solve(Eigen::Matrix<double, 5, 6>(evidence->by_jet * P))
           .transpose();
   for (std::size_t c = 0; c < shares.size(); ++c) {
-    constexpr double kUnlikely = 0.01;
-    if (shares[c] < kUnlikely)
+    if (shares[c] < kUnlikelyKind)
       continue;
     SurfaceHypothesis h;
     h.share = shares[c];
     h.jet.value =
         surface.jet.value + follow * (posteriors[c].traits - evidence->traits);
     h.jet.white = symmetrized(
-        JetMatrix(P - follow * (evidence->covariance - posteriors[c].covariance) *
+        JetMatrix(P - follow * (evidence->covariance - posteriors[c].covariance()) *
                           follow.transpose()));
     h.s3_per_m2 = prior.kinds[c].s3_per_m2;
     surface.hypotheses.push_back(h);

@@ -10,8 +10,7 @@ namespace {
 int
 cellOf(double coordinate)
 {
-  const double cell =
-      std::floor((coordinate + SupportGrid::kReach) / SupportGrid::cellSize());
+  const double cell = (coordinate + SupportGrid::kReach) / SupportGrid::cellSize();
   // Written so that NaN is beyond, too.
   return cell >= 0.0 && cell < SupportGrid::kCells ? static_cast<int>(cell) : -1;
 }

@@ -46,6 +46,9 @@ findBuiltIn(const std::string& what,
     for (const fs::path& place : foldersOf(folder))
       if (isFile(place / (name_or_path + ".yaml")))
         return (place / (name_or_path + ".yaml")).string();
+  if (std::error_code ignored; fs::is_directory(name_or_path, ignored))
+    throw std::runtime_error(
+        fmt::format("{} {}: is a folder, not a file", what, name_or_path));
   std::string known;
   for (const std::string& name : listBuiltIn(folder))
     known += (known.empty() ? "" : ", ") + name;

@@ -25,10 +25,21 @@ discOf(double radius_m)
   return corners;
 }
 
-/// One of the three ways to say it.
+/// One of the three ways to say it, and no other beside it.
 std::vector<Eigen::Vector2d>
 readSole(Section section)
 {
+  std::string chosen;
+  for (const char* name : {"corners_m", "radius_m", "length_m", "width_m"}) {
+    if (!section.has(name))
+      continue;
+    if (chosen.empty())
+      chosen = name;
+    else if (chosen != "length_m")
+      section.fail(name,
+                   "goes without " + chosen +
+                       ": a sole is corners_m, radius_m, or length_m and width_m");
+  }
   std::vector<Eigen::Vector2d> sole;
   if (section.has("corners_m"))
     sole = section.points("corners_m");
@@ -70,6 +81,8 @@ readFriction(Section section)
   friction.sigma = section.number("sigma");
   if (friction.sigma < 0.0)
     section.fail("sigma", "must be >= 0");
+  if (friction.sigma > friction.mean)
+    section.fail("sigma", "must not be above the mean");
   section.rejectUnknown();
   return friction;
 }
@@ -81,8 +94,13 @@ readTolerances(Section section, Ankle ankle)
   tolerances.height_m = section.positive("height_m");
   tolerances.gap_m = section.positive("gap_m");
   tolerances.contact_m = section.positive("contact_m");
-  if (ankle == Ankle::Stiff || section.has("tilt_rad"))
+  if (tolerances.contact_m > tolerances.gap_m)
+    section.fail("contact_m",
+                 "must not be above gap_m: what is in contact would be too far");
+  if (ankle == Ankle::Stiff)
     tolerances.tilt_rad = section.positive("tilt_rad");
+  else if (section.has("tilt_rad"))
+    section.fail("tilt_rad", "goes with ankle: stiff; a compliant one tilts freely");
   if (section.has("min_support")) {
     tolerances.min_support = section.positive("min_support");
     if (tolerances.min_support > 1.0)

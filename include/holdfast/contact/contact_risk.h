@@ -85,6 +85,10 @@ struct SurfacePrior {
 /// \param load_direction frame of the map, of any length but zero.
 SurfacePrior surfacePriorOf(const PatchMap& map, const Eigen::Vector3d& load_direction);
 
+/// Kinds that a patch is of with less than this probability are left out, so that no
+/// probability is off by more than it for each of them.
+inline constexpr double kUnlikelyKind = 1e-4;
+
 /// A patch of a map, with its roughness, and what is known of all surfaces there.
 ContactSurface contactSurfaceOf(const PatchMap& map,
                                 const MapPatch& patch,

@@ -18,7 +18,7 @@ enum class Ankle : std::uint8_t {
 /// Coefficient of friction: lognormal, since it is positive.
 struct Friction {
   double mean = 0.6;
-  double sigma = 0.1; ///< standard deviation; 0: known exactly
+  double sigma = 0.1; ///< standard deviation, at most the mean; 0: known exactly
 };
 
 /// Beyond these a contact counts as failed.
@@ -53,8 +53,8 @@ struct Foot {
 Foot rectangularFoot(double length_m, double width_m);
 
 /// Empty when the foot makes sense, else one sentence naming the first thing that does
-/// not: fewer than three corners, edges that cross, no area, numbers that are negative
-/// or not finite.
+/// not: fewer than three corners, edges that cross, no area, less than 1 mm, numbers
+/// that are negative or not finite, a friction of which nothing is known.
 std::string validityError(const Foot& foot);
 
 double soleArea(const Foot& foot); ///< m^2
