@@ -10,7 +10,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 SAMPLES = ROOT / "samples" / "python"
-PAGE = ROOT / "samples" / "python.md"
+PAGE = ROOT / "doc" / "python.md"
 
 
 def run(*command, folder):
