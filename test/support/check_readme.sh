@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # The README is short, leads to every page, and shows what works: its C++ is the marked
-# part of samples/first_patch.cpp, and its commands run (its Python: test_samples.py).
+# part of samples/first_patch.cpp, its commands run (its Python: test_samples.py), and
+# the table that doc/program.md shows is the one that is printed.
 #
 #   check_readme.sh [HOLDFAST SCRATCH]     the program, for the commands
 set -euo pipefail
@@ -37,3 +38,12 @@ done
 for file in results/rocks.patches.json rocks.png rocks.html; do
   [[ -s $file ]] || fail "the commands of the README made no $file"
 done
+
+# Counts may differ by a few between processors; more is another table.
+table() {
+  sed -n '/^surface (medians)/,/^[^a-z]*$\|^rejected/p' | awk '$2 ~ /^[0-9]+$/ { print $1, $2 }'
+}
+paste -d ' ' <(table <"$root/doc/program.md") \
+  <("$program" fit samples/rocks.pcd -o again 2>&1 | table) |
+  awk 'NF != 4 || $1 != $3 || ($2 - $4) ^ 2 > (3 + 0.02 * $4) ^ 2 { bad = 1; print }
+       END { exit bad || NR != 5 }' || fail "doc/program.md shows another table than fit prints"
