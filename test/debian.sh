@@ -21,5 +21,5 @@ version=$(dpkg-parsechangelog -l "$folder/main/debian/changelog" -S Version)
 changes=$folder/holdfast_${version}_$(dpkg --print-architecture).changes
 lintian --allow-root --fail-on error --tag-display-limit 0 "$changes"
 # Without those of debugging symbols.
-mapfile -t debs < <(ls "$folder"/*.deb | grep -v dbgsym)
+mapfile -t debs < <(find "$folder" -maxdepth 1 -name '*.deb' ! -name '*-dbgsym_*' | sort)
 "$root/test/support/try_packages.sh" "$folder" "${debs[@]}"

@@ -99,7 +99,7 @@ in_layer() {
   (cd "$layer/written" && find . -type d -iname '*holdfast*') >>"$layer/left"
   [[ ! -s $layer/left ]] || fail "left behind: $(cat "$layer/left")"
   for name in "${names[@]}"; do
-    [[ -z $(compgen -G "$root/var/lib/dpkg/info/$name[.:]*") ]] || fail "dpkg knows $name"
+    [[ -z $(compgen -G "$root/var/lib/dpkg/info/${name}[.:]*") ]] || fail "dpkg knows $name"
   done
 }
 
