@@ -13,6 +13,7 @@ source "$root/cmake/setup.sh"
 folder=$(realpath -m "${1:-$root/build-debian}")
 
 install_packages build python package
+rm -rf "$folder/main" "$folder"/*.deb
 mkdir -p "$folder/main"
 git -C "$root" archive HEAD | tar -x -C "$folder/main"
 (cd "$folder/main" && dpkg-buildpackage --build=binary --unsigned-source --unsigned-changes \
