@@ -95,7 +95,8 @@ set(CPACK_DEBIAN_LIB_PACKAGE_CONTROL_EXTRA ${control}/triggers ${control}/shlibs
 if(TARGET holdfast)
   holdfast_package(program holdfast)
 endif()
-if(HOLDFAST_WITH_PYTHON)
+# A module is for the Python that it was built with; packages are for the system's.
+if(HOLDFAST_WITH_PYTHON AND Python_EXECUTABLE MATCHES "^/usr/bin/")
   holdfast_package(module python3-holdfast)
   # What dh_python3 does: compiled at installation, and that removed with the package.
   set(scripts ${PROJECT_BINARY_DIR}/debian_python)
