@@ -24,19 +24,10 @@ install(FILES ${PROJECT_SOURCE_DIR}/LICENSE
 # The pages, and the samples that they speak of; not the tables of long runs.
 install(FILES ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CHANGELOG.md
   DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT dev)
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/samples
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/doc ${PROJECT_SOURCE_DIR}/samples
   DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT dev
   PATTERN experiments EXCLUDE
   PATTERN quickstart.sh EXCLUDE)
-# Packages want the licence of each under its own name.
-if(PROJECT_IS_TOP_LEVEL)
-  foreach(package lib dev program)
-    string(TOUPPER ${package} upper)
-    install(FILES ${PROJECT_SOURCE_DIR}/LICENSE RENAME copyright
-      DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${CPACK_DEBIAN_${upper}_PACKAGE_NAME}
-      COMPONENT ${package} EXCLUDE_FROM_ALL)
-  endforeach()
-endif()
 if(TARGET holdfast)
   install(TARGETS holdfast COMPONENT program)
   foreach(module holdfast_viewer holdfast_columns holdfast_comparison)

@@ -55,7 +55,7 @@ if(TARGET holdfast_man)
   add_test(NAME packages
     COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/support/check_packages.sh
       ${PROJECT_BINARY_DIR} ${scratch_dir}/debian)
-  set_tests_properties(packages PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 600)
+  set_tests_properties(packages PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 1200)
 endif()
 
 add_consumer_test(consumer "")

@@ -1,4 +1,4 @@
-# The house itself: formatting, layers, set-up, and that the README's snippet is a sample.
+# The house itself: formatting, layers, set-up, pages and versions.
 set(support ${CMAKE_CURRENT_SOURCE_DIR}/support)
 
 add_test(NAME format COMMAND ${support}/check_format.sh)
@@ -49,7 +49,19 @@ endif()
 
 add_test(NAME package_setup COMMAND ${support}/check_setup.sh)
 
-add_test(NAME readme_snippet COMMAND ${support}/check_readme.sh)
+if(TARGET holdfast AND NOT HOLDFAST_QUICKSTART)
+  set(program_of_readme $<TARGET_FILE:holdfast> ${scratch_dir}/readme)
+endif()
+add_test(NAME readme COMMAND ${support}/check_readme.sh ${program_of_readme})
+
+add_test(NAME links_of_pages COMMAND ${support}/check_links.sh)
+set(bad_page ${scratch_dir}/bad_page)
+file(WRITE ${bad_page}/page.md "# A heading\n[a](#a-heading) [b](#b) ![c](c.png)\n")
+add_test(NAME links_of_pages_finds_violations COMMAND ${support}/check_links.sh ${bad_page})
+set_tests_properties(links_of_pages_finds_violations PROPERTIES
+  PASS_REGULAR_EXPRESSION "no heading for #b.*no c.png")
+
+add_test(NAME versions COMMAND ${support}/check_versions.sh)
 
 if(TARGET doc)
   add_test(NAME reference_pages

@@ -42,7 +42,7 @@ constexpr const char* kExamples = R"(Examples:
   holdfast live --device walk.oni --every-frame -o walk
       the same patches, and those of all frames, from the recording
   holdfast live --device walk.oni --every-frame --map walk.json
-      what the frames say together, fused (samples/maps.md)
+      what the frames say together, fused (doc/maps.md)
 
 Newer frames replace those that wait, so that patches are always of the latest view;
 frames lost that way are counted as dropped. Seeds whose patch was good in the frame

@@ -20,7 +20,7 @@ struct RiskReport {
   std::vector<PlanarRegion> regions;
 };
 
-/// One object (samples/risk.md explains it), a foothold or patch in each line. Numbers
+/// One object (doc/risk.md explains it), a foothold or patch in each line. Numbers
 /// that nobody knows are null.
 void writeRiskJson(std::ostream& out, const RiskReport& report);
 

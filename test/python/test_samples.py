@@ -10,7 +10,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 SAMPLES = ROOT / "samples" / "python"
-PAGE = ROOT / "samples" / "python.md"
+PAGE = ROOT / "doc" / "python.md"
+README = ROOT / "README.md"
 
 
 def run(*command, folder):
@@ -52,10 +53,10 @@ def test_every_sample_is_tested():
         assert f'"{sample.name}"' in source, sample.name
 
 
-def test_what_the_page_shows_works(tmp_path):
+def test_what_the_pages_show_works(tmp_path):
     """Block after block, as a reader would."""
-    blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(), flags=re.S)
-    assert len(blocks) > 2
-    (tmp_path / "page.py").write_text("\n".join(blocks))
-    out = run(tmp_path / "page.py", folder=tmp_path)
-    assert "paraboloid" in out
+    for page, blocks_at_least, said in ((README, 1, r"\(\d+, 11, 11\)"), (PAGE, 3, "paraboloid")):
+        blocks = re.findall(r"```python\n(.*?)```", page.read_text(), flags=re.S)
+        assert len(blocks) >= blocks_at_least
+        (tmp_path / "page.py").write_text("\n".join(blocks))
+        assert re.search(said, run(tmp_path / "page.py", folder=tmp_path))

@@ -52,8 +52,6 @@ def wheel(tmp_path_factory):
     shutil.copytree(
         ROOT, source, ignore=shutil.ignore_patterns("build*", ".git", "test", "samples")
     )
-    (source / "samples").mkdir()
-    shutil.copy(ROOT / "samples" / "python.md", source / "samples")
     pip = (sys.executable, "-m", "pip", "wheel", "--no-build-isolation", "--no-index")
     run(*pip, "--no-deps", "--wheel-dir", folder, source)
     (made,) = folder.glob("holdfast-*.whl")
