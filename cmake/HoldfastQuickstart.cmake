@@ -25,7 +25,7 @@ set(quickstart_without
   src/io/trajectory_file
   apps/calibrate/ apps/collect/ apps/map/ apps/report/ apps/risk/ apps/simulate/
   apps/plot.cpp
-  apps/result_input.cpp
+  apps/result_input.cpp apps/risk_result.cpp
   # All but what images of --dense are drawn with.
   apps/render/render.cpp apps/render/render_scene apps/render/render_settings
   apps/render/patch_support apps/render/view apps/render/render_risk
