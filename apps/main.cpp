@@ -5,7 +5,9 @@
 
 #include <CLI/CLI.hpp>
 
+#include <cstddef>
 #include <iostream>
+#include <new>
 #include <string>
 
 namespace {
@@ -68,6 +70,28 @@ wrongUsage(const CLI::App& app)
   return fit->count("--manifest") > 0 ? 1 : 2;
 }
 
+constexpr std::size_t kStackBytes = 256 * 1024;
+
+[[gnu::noinline]] void
+touchStack()
+{
+  constexpr std::size_t kPage = 4096;
+  [[maybe_unused]] volatile char stack[kStackBytes];
+  for (std::size_t i = 0; i < kStackBytes; i += kPage)
+    stack[i] = 0;
+}
+
+/// A stack that cannot grow ends the process without a word. Under a limit of memory it
+/// therefore grows at once, while somebody can still be told: further than the sums of
+/// a fit let it, whose frames are the largest.
+void
+growStack()
+{
+  // Throws where there is not as much.
+  ::operator delete(::operator new(2 * kStackBytes));
+  touchStack();
+}
+
 int
 run(int argc, char** argv)
 {
@@ -115,6 +139,7 @@ main(int argc, char** argv)
 {
   holdfast::app::prepareForTheEnd();
   try {
+    growStack();
     return run(argc, argv);
   }
   catch (...) {

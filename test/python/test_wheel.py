@@ -87,7 +87,7 @@ def test_the_sources_that_are_packed_are_all_it_takes(tmp_path):
             if path.is_file() and "__pycache__" not in path.parts:
                 assert str(path.relative_to(ROOT)) in names, path
     tops = {name.partition("/")[0] for name in names}
-    assert tops >= {"CMakeLists.txt", "LICENSE", "pyproject.toml", "setup.py", "samples"}
+    assert tops >= {"CMakeLists.txt", "LICENSE", "pyproject.toml", "setup.py", "doc"}
     assert not tops & {"apps", "build", "test"}
 
 
