@@ -97,8 +97,10 @@ keepApart(const std::vector<const Foothold*>& sorted,
 std::string
 validityError(const FootholdOptions& options)
 {
-  if (!options.load_direction.allFinite() || options.load_direction.isZero(0.0))
-    return "the direction of the load must be finite and not zero";
+  Placement along_load;
+  along_load.load_direction = options.load_direction;
+  if (const std::string error = validityError(along_load); !error.empty())
+    return error;
   if (options.yaws < 1)
     return "at least one yaw must be tried";
   if (!std::isfinite(options.spacing_m) || options.spacing_m < 0.0)

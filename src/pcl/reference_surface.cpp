@@ -133,7 +133,7 @@ ReferenceSurface::normal() const
 }
 
 LateralDisc::LateralDisc(const ReferenceSurface& surface, double radius_m)
-: surface_(surface), ray_(surface.seedRay())
+: surface_(surface)
 {
   const Eigen::Vector3d point = surface.point(), normal = surface.normal();
   const double rr = radius_m * radius_m;

@@ -80,17 +80,16 @@ private:
 
 /// Squared distance along the tangent plane from a point of it, less a squared radius,
 /// times rho^2, of the point at z = 1 / rho of the ray (x, y, 1).
-template <typename Scalar>
 struct LateralExcess {
-  std::array<Scalar, 3> point, normal;
-  Scalar squared_radius;
+  std::array<double, 3> point, normal;
+  double squared_radius;
 
-  Scalar operator()(Scalar x, Scalar y, Scalar rho) const
+  double operator()(double x, double y, double rho) const
   {
     // rho (P - P0).
-    const Scalar gx = x - rho * point[0], gy = y - rho * point[1];
-    const Scalar gz = Scalar(1) - rho * point[2];
-    const Scalar off = normal[0] * gx + normal[1] * gy + normal[2] * gz;
+    const double gx = x - rho * point[0], gy = y - rho * point[1];
+    const double gz = 1.0 - rho * point[2];
+    const double off = normal[0] * gx + normal[1] * gy + normal[2] * gz;
     return gx * gx + gy * gy + gz * gz - off * off - squared_radius * rho * rho;
   }
 };
@@ -111,7 +110,7 @@ public:
   /// rho.
   double excess(double s, double t, double rho) const
   {
-    return excess_(ray_.x() + s, ray_.y() + t, rho);
+    return excess_(surface_.seedRay().x() + s, surface_.seedRay().y() + t, rho);
   }
 
   /// Of the squared distance along the tangent plane, less the squared radius, times
@@ -134,15 +133,14 @@ public:
     return surface_;
   }
 
-  const LateralExcess<double>& lateralExcess() const
+  const LateralExcess& lateralExcess() const
   {
     return excess_;
   }
 
 private:
   ReferenceSurface surface_;
-  Eigen::Vector2d ray_;
-  LateralExcess<double> excess_;
+  LateralExcess excess_;
   OnTangentPlane on_tangent_plane_;
 };
 
