@@ -16,6 +16,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 
@@ -161,23 +163,55 @@ addClosedForms(const RiskChoice& choice,
 }
 
 /// Predictions of like size and how often what they speak of happened.
-struct Reliability {
-  Mean predicted, total, happened;
-
-  void add(double p, double sum, bool is_so)
+class Reliability {
+public:
+  /// \param p predicted probability of what is_so says of the case
+  void add(double p, bool is_so, const RiskCase& c)
   {
-    predicted.add(p);
-    total.add(sum);
-    happened.add(is_so ? 1.0 : 0.0);
+    predicted_.add(p);
+    total_.add(c.predicted.total);
+    happened_.add(is_so ? 1.0 : 0.0);
+    Walk& walk = walks_[c.walk];
+    ++walk.cases;
+    walk.excess += (is_so ? 1.0 : 0.0) - p;
   }
   void addTo(Json& row) const
   {
-    row["cases"] = predicted.count();
-    row["predicted"] = predicted.value();
-    row["predicted_total"] = total.value();
-    row["happened"] = happened.value();
-    row["standard_error"] = happened.standardError();
+    row["cases"] = predicted_.count();
+    row["predicted"] = predicted_.value();
+    row["predicted_total"] = total_.value();
+    row["happened"] = happened_.value();
+    row["standard_error"] = standardError();
   }
+
+private:
+  struct Walk {
+    int cases = 0;
+    double excess = 0.0; ///< of what happened over what was predicted
+  };
+
+  /// Of happened less predicted, by how much that differs between walks: within one,
+  /// places are looked at again and again and share errors of pose and pattern. Null
+  /// with one walk.
+  Json standardError() const
+  {
+    const auto walks = static_cast<double>(walks_.size());
+    if (walks < 2.0)
+      return {};
+    double cases = 0.0, excess = 0.0, squares = 0.0;
+    for (const auto& [seed, walk] : walks_) {
+      cases += walk.cases;
+      excess += walk.excess;
+    }
+    for (const auto& [seed, walk] : walks_) {
+      const double off = walk.excess - excess / cases * walk.cases;
+      squares += off * off;
+    }
+    return std::sqrt(squares * walks / (walks - 1.0)) / cases;
+  }
+
+  Mean predicted_, total_, happened_;
+  std::map<std::uint64_t, Walk> walks_;
 };
 
 struct Group {
@@ -201,11 +235,9 @@ addBins(const Group& group, const std::vector<RiskCase>& cases, Report& report)
 {
   std::array<Reliability, kBins> bins;
   for (const RiskCase& c : cases) {
-    const int bin =
-        std::clamp(static_cast<int>(kBins * c.predicted.joint), 0, kBins - 1);
-    bins[static_cast<std::size_t>(bin)].add(c.predicted.joint,
-                                            c.predicted.total,
-                                            c.failed());
+    const double p = probabilityOfAny(c.predicted);
+    const int bin = std::clamp(static_cast<int>(kBins * p), 0, kBins - 1);
+    bins[static_cast<std::size_t>(bin)].add(p, c.failed(), c);
   }
   Series series{fmt::format("{}, {}", group.noise, group.views), {}, {}};
   series.style = SeriesStyle::Line;
@@ -229,9 +261,9 @@ addEvents(const Group& group, const std::vector<RiskCase>& cases, Report& report
 {
   Reliability slip, height, gap;
   for (const RiskCase& c : cases) {
-    slip.add(c.predicted.slip, c.predicted.slip, c.slipped);
-    height.add(c.predicted.height, c.predicted.height, c.was_off_height);
-    gap.add(c.predicted.gap, c.predicted.gap, c.gaped);
+    slip.add(c.predicted.slip, c.slipped, c);
+    height.add(c.predicted.height, c.was_off_height, c);
+    gap.add(c.predicted.gap, c.gaped, c);
   }
   for (const auto& [name, reliability] : {std::pair("slip", &slip),
                                           std::pair("height", &height),
@@ -248,8 +280,9 @@ addChosen(const Group& group, const std::vector<ChosenCase>& chosen, Report& rep
 {
   Reliability first, again;
   for (const ChosenCase& c : chosen) {
-    first.add(c.chosen.predicted.joint, c.chosen.predicted.total, c.chosen.failed());
-    again.add(c.judged_again, c.judged_again, c.chosen.failed());
+    const bool failed = c.chosen.failed();
+    first.add(probabilityOfAny(c.chosen.predicted), failed, c.chosen);
+    again.add(c.judged_again, failed, c.chosen);
   }
   for (const auto& [name, reliability] :
        {std::pair("best of 20, as chosen", &first),
@@ -324,8 +357,11 @@ describe(const RiskChoice& choice, Report& report)
           "stand on random places of patches of {:.3g} cm radius, seen in the last "
           "frame alone (single) or in all so far (fused): predicted is the mean of the "
           "joint probability that the foot slips, is off its height or gapes; happened "
-          "is how often the true surface under the sole does that; union: the mean of "
-          "the sum over events.",
+          "is how often the true surface under the sole does that; +- is the standard "
+          "error of their difference, from how much it differs between walks, each "
+          "with "
+          "noise, odometry and pattern of its own; union: the mean of the sum over all "
+          "events, what was not seen under the sole among them.",
           choice.walk.step_m * (choice.walk.frames - 1),
           100.0 * choice.radius_m),
       "Best of 20: of 20 random places for one foot the one with the least total risk, "

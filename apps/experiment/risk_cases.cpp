@@ -93,7 +93,6 @@ happened(const Scene& scene,
 struct Judged {
   Placement placement;
   ContactEvents risk;
-  int views;
 };
 
 std::optional<Judged>
@@ -107,7 +106,7 @@ judge(const SeenMap& seen,
   const ContactRisk risk = contactRisk(surface, foot, placement);
   if (!risk.quality)
     return std::nullopt;
-  return Judged{placement, risk.quality->risk, patch.views};
+  return Judged{placement, risk.quality->risk};
 }
 
 /// One foot after the other on patches seen in the last frame.
@@ -124,7 +123,6 @@ casesOn(const Scene& scene, const SeenMap& seen, std::mt19937_64& generator)
       continue;
     if (auto result = happened(scene, seen, foot, judged->placement, generator)) {
       result->predicted = judged->risk;
-      result->views = judged->views;
       cases.push_back(*result);
     }
   }
@@ -176,8 +174,7 @@ chooseOn(const Scene& scene,
     if (!other || !result)
       continue;
     result->predicted = best->risk;
-    result->views = best->views;
-    chosen.push_back({*result, other->joint});
+    chosen.push_back({*result, probabilityOfAny(*other)});
   }
   return chosen;
 }
@@ -271,10 +268,23 @@ private:
 
 } // namespace
 
+double
+probabilityOfAny(const ContactEvents& events)
+{
+  const double seen = 1.0 - events.support; // contactRisk() answers for more than none
+  return 1.0 - (1.0 - events.joint) / seen;
+}
+
 RiskOutcome
 riskWalk(const RiskWalk& walk)
 {
-  return Walker(walk).run();
+  RiskOutcome outcome = Walker(walk).run();
+  for (std::vector<RiskCase>* cases : {&outcome.single, &outcome.fused})
+    for (RiskCase& c : *cases)
+      c.walk = walk.seed;
+  for (ChosenCase& c : outcome.chosen)
+    c.chosen.walk = walk.seed;
+  return outcome;
 }
 
 } // namespace holdfast::app

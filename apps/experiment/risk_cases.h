@@ -11,11 +11,15 @@
 
 namespace holdfast::app {
 
+/// Probability of slip, height, tilt or gap alone: ContactEvents::joint also counts
+/// what of the sole's place was not seen, which is nothing that happens to the foot.
+double probabilityOfAny(const ContactEvents& events);
+
 /// What a foot was told to expect where, and what happened.
 struct RiskCase {
   ContactEvents predicted;
   bool slipped = false, was_off_height = false, gaped = false;
-  int views = 0;
+  std::uint64_t walk = 0; ///< its seed: places of one share errors of pose and pattern
 
   bool failed() const
   {
