@@ -15,7 +15,7 @@
 namespace holdfast::app {
 namespace {
 
-constexpr const char* kExamples = R"(Examples:
+constexpr const char* kRecordExamples = R"(Examples:
   holdfast record -o walk.oni
       what the first camera delivers, until Ctrl-C
   holdfast record -o walk.oni --seconds 20 --device 2
@@ -78,7 +78,7 @@ addRecordCommand(CLI::App& app, int& exit_code)
 {
   CLI::App* command =
       app.add_subcommand("record", "Record a depth camera to .oni or PCD files");
-  command->footer(kExamples);
+  command->footer(kRecordExamples);
   const auto settings = std::make_shared<RecordSettings>();
   addDeviceOptions(*command, settings->device);
   addRunOptions(*command, settings->run);

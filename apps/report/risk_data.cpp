@@ -23,7 +23,7 @@ struct FootholdColumn {
   double (*value)(const Foothold&, const ContactQuality&);
 };
 
-const FootholdColumn kColumns[] = {
+const FootholdColumn kFootholdColumns[] = {
     {"total", [](const Foothold&, const ContactQuality& q) { return q.risk.total; }},
     {"slip", [](const Foothold&, const ContactQuality& q) { return q.risk.slip; }},
     {"height", [](const Foothold&, const ContactQuality& q) { return q.risk.height; }},
@@ -51,7 +51,7 @@ Json
 columnsJson(const std::vector<Foothold>& footholds, BinaryBlock& block)
 {
   Json columns = Json::object();
-  for (const FootholdColumn& column : kColumns) {
+  for (const FootholdColumn& column : kFootholdColumns) {
     std::vector<float> numbers;
     for (const Foothold& foothold : footholds)
       numbers.push_back(

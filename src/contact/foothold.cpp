@@ -1,6 +1,7 @@
 #include <holdfast/contact/foothold.h>
 
 #include "contact/best_yaw.h"
+#include "contact/require.h"
 #include "parallel/parallel_for.h"
 
 #include <algorithm>
@@ -10,13 +11,6 @@
 
 namespace holdfast {
 namespace {
-
-void
-requireValid(const std::string& error)
-{
-  if (!error.empty())
-    throw std::invalid_argument("holdfast::rankFootholds: " + error);
-}
 
 /// Distance of the farthest cell that was hit from the middle of all, m.
 double
@@ -123,8 +117,8 @@ middleOfSupport(const ContactSurface& surface)
 FootholdRanking
 rankFootholds(const PatchMap& map, const Foot& foot, const FootholdOptions& options)
 {
-  requireValid(validityError(foot));
-  requireValid(validityError(options));
+  contact::requireValid("rankFootholds", validityError(foot));
+  contact::requireValid("rankFootholds", validityError(options));
   const std::vector<contact::Sole> soles =
       contact::inAllDirections(contact::Sole(foot), options.yaws);
   const SurfacePrior prior = surfacePriorOf(map, options.load_direction);

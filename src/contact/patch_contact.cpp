@@ -2,6 +2,7 @@
 
 #include "contact/evaluation.h"
 #include "contact/field.h"
+#include "contact/require.h"
 #include "contact/sole.h"
 #include <holdfast/patch/boundary.h>
 
@@ -9,17 +10,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 namespace holdfast {
 namespace {
-
-void
-requireValid(const std::string& error)
-{
-  if (!error.empty())
-    throw std::invalid_argument("holdfast::patchContact: " + error);
-}
 
 /// The expected surface less the pad at places of the pad, pressed on evenly.
 struct Misfit {
@@ -143,7 +136,7 @@ validityError(const PatchContactOptions& options)
 Foot
 padOf(const Patch& patch, double spacing_m)
 {
-  requireValid(validityError(patch));
+  contact::requireValid("patchContact", validityError(patch));
   Foot pad;
   // Seen from inside the robot, x stays and y turns round.
   for (const Eigen::Vector2d& corner : outline(patch, spacing_m))
@@ -158,8 +151,8 @@ patchContact(const ContactSurface& surface,
              const Placement& placement,
              const PatchContactOptions& options)
 {
-  requireValid(validityError(options));
-  requireValid(validityError(placement));
+  contact::requireValid("patchContact", validityError(options));
+  contact::requireValid("patchContact", validityError(placement));
   const contact::Sole sole(pad);
   PatchContact result;
   const Pose load = loadFrame(placement);

@@ -2,6 +2,7 @@
 
 #include "contact/best_yaw.h"
 #include "contact/field.h"
+#include "contact/require.h"
 #include "parallel/parallel_for.h"
 #include <holdfast/contact/foothold.h>
 #include <holdfast/geometry/constants.h>
@@ -19,13 +20,6 @@ namespace {
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr std::size_t kLayers = kRiskLayerNames.size();
 constexpr double kMaxCells = 1e7;
-
-void
-requireValid(const std::string& error)
-{
-  if (!error.empty())
-    throw std::invalid_argument("holdfast::riskGrid: " + error);
-}
 
 /// A patch as the load meets it: over the grid's plane, about its anchor.
 struct SeenFromAbove {
@@ -298,8 +292,8 @@ RiskGrid::point(int row, int column) const
 RiskGrid
 riskGrid(const PatchMap& map, const Foot& foot, const RiskGridOptions& options)
 {
-  requireValid(validityError(foot));
-  requireValid(validityError(options));
+  contact::requireValid("riskGrid", validityError(foot));
+  contact::requireValid("riskGrid", validityError(options));
   const std::vector<contact::Sole> soles =
       contact::inAllDirections(contact::Sole(foot), options.yaws);
   Placement level;

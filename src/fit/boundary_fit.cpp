@@ -40,7 +40,7 @@ struct StateFrame {
 StateFrame
 stateFrame(const Eigen::Matrix3d& axes,
            const BoundRequest& request,
-           const Placement& placed)
+           const SurfacePlacement& placed)
 {
   StateFrame f{axes, placed.c, {}, {}, {}};
   const Eigen::Matrix3d W = f.R.transpose() * request.surface.R;
@@ -81,7 +81,7 @@ curvatureShares(const UnboundedSurface& surface)
 
 // The principal axes of the curvatures, of planes those of the points.
 Eigen::Matrix3d
-axesOfPatch(const BoundRequest& request, const Placement& placed)
+axesOfPatch(const BoundRequest& request, const SurfacePlacement& placed)
 {
   PatchState state;
   state.type = request.type;
@@ -103,7 +103,7 @@ axesOfPatch(const BoundRequest& request, const Placement& placed)
 PlaneMatrix
 curvatureIn(const StateFrame& f,
             const UnboundedSurface& surface,
-            const Placement& placed)
+            const SurfacePlacement& placed)
 {
   PlaneMatrix K;
   const Eigen::Matrix3d shares = curvatureShares(surface);
@@ -242,7 +242,7 @@ writeGroup(int at, int count, const PlaneMatrix& map, PatchJacobian& jacobian)
 void
 writeState(const BoundRequest& request,
            const BoundSettings& settings,
-           const Placement& placed,
+           const SurfacePlacement& placed,
            BoundedPatch& out)
 {
   StateFrame f = stateFrame(axesOfPatch(request, placed), request, placed);
@@ -287,12 +287,13 @@ statusOf(const Patch& patch)
 BoundedPatch
 boundPatch(const BoundRequest& request, const BoundSettings& settings)
 {
-  const std::optional<Placement> placed = withModel(request.surface.model, [&](auto m) {
-    return m.place({request.surface,
-                    request.scatter,
-                    request.plane,
-                    settings.centre_on_normal_line});
-  });
+  const std::optional<SurfacePlacement> placed =
+      withModel(request.surface.model, [&](auto m) {
+        return m.place({request.surface,
+                        request.scatter,
+                        request.plane,
+                        settings.centre_on_normal_line});
+      });
   BoundedPatch out;
   out.state.type = out.patch.type = request.type;
   if (!placed) {

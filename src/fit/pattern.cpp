@@ -1,6 +1,8 @@
 #include "pattern.h"
 
 #include "geometry/symmetric.h"
+#include <holdfast/geometry/constants.h>
+
 #include "surface_fit.h"
 
 #include <Eigen/Cholesky>
@@ -126,7 +128,6 @@ PatternSupport::PatternSupport(PointBatch& batch)
   M(0, 1) = M(1, 0) = sums.squares[1] / n - u * v;
   M(1, 1) = sums.squares[2] / n - v * v + kPixelVariance;
   // The second moments of a uniform ellipse are a quarter of its semi-axes squared.
-  constexpr double kPi = 3.14159265358979323846;
   const double root = std::sqrt(std::max(M.determinant(), 0.0));
   radius_px_ = 2.0 * std::sqrt(root);
   spacing_px_ = radius_px_ * std::sqrt(kPi / n);

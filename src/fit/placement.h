@@ -22,7 +22,7 @@ using JointRows3 = Eigen::Matrix<double, 3, JointLayout::kSize, Eigen::RowMajor>
 
 /// A frame before its moments are looked at: columns of the joint are in the axes of
 /// the surface's R, rows of delta and gamma = R^T dc in those of the final frame.
-struct Placement {
+struct SurfacePlacement {
   Eigen::Matrix3d R;
   Eigen::Vector3d c; ///< relative to the batch's origin
   Eigen::Vector3d z; ///< normal at c, batch axes; of a sphere R does not follow it

@@ -19,13 +19,6 @@
 namespace holdfast {
 namespace {
 
-[[noreturn]] void
-fail(const std::string& path, int error)
-{
-  throw std::runtime_error(
-      path + ": cannot be written: " + std::generic_category().message(error));
-}
-
 /// Where a path leads when all links are followed, also if nothing is there.
 std::string
 followLinks(const std::string& path)
@@ -37,11 +30,11 @@ followLinks(const std::string& path)
   for (int i = 0; i < kMostLinks && fs::is_symlink(target, error); ++i) {
     const fs::path next = fs::read_symlink(target, error);
     if (error)
-      fail(path, error.value());
+      io::failToWrite(path, error.value());
     target = target.parent_path() / next; // which is `next` if that is absolute
   }
   if (fs::is_symlink(target, error))
-    fail(path, ELOOP);
+    io::failToWrite(path, ELOOP);
   return target.string();
 }
 
@@ -85,7 +78,7 @@ public:
   {
     stream_.flush();
     if (!stream_)
-      fail(path_, buffer_->error() != 0 ? buffer_->error() : EIO);
+      io::failToWrite(path_, buffer_->error() != 0 ? buffer_->error() : EIO);
     attempt([this] {
       if (temporary_)
         temporary_->secure();
@@ -106,11 +99,11 @@ private:
     if (isWrittenDirectly(path_)) {
       device_ = ::open(path_.c_str(), O_WRONLY | O_CLOEXEC | O_NOCTTY);
       if (device_ < 0)
-        fail(path_, errno);
+        io::failToWrite(path_, errno);
       return;
     }
     if (path_.empty() || path_.back() == '/')
-      fail(path_, path_.empty() ? ENOENT : EISDIR);
+      io::failToWrite(path_, path_.empty() ? ENOENT : EISDIR);
     const std::string target = followLinks(path_);
     attempt([&] { temporary_.emplace(target); });
   }
@@ -122,7 +115,7 @@ private:
       step();
     }
     catch (const std::system_error& error) {
-      fail(path_, error.code().value());
+      io::failToWrite(path_, error.code().value());
     }
   }
 

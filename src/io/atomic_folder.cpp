@@ -19,13 +19,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-[[noreturn]] void
-fail(const std::string& path, int error)
-{
-  throw std::runtime_error(
-      path + ": cannot be written: " + std::generic_category().message(error));
-}
-
 /// The path itself, not of a link to it, without slashes at its end.
 /// \throw std::runtime_error when something is there already.
 std::string
@@ -33,7 +26,7 @@ freePath(const std::string& path)
 {
   std::error_code error;
   if (path.empty())
-    fail(path, ENOENT);
+    io::failToWrite(path, ENOENT);
   if (!fs::exists(path, error)) {
     const std::string::size_type end = path.find_last_not_of('/');
     return path.substr(0, end + 1);
@@ -83,7 +76,7 @@ public:
       if (take())
         return;
     }
-    fail(path_, EEXIST);
+    io::failToWrite(path_, EEXIST);
   }
 
   ~Impl()
@@ -103,7 +96,7 @@ public:
     ::fsync(descriptor_); // as far as the file system can
     // Replaces an empty folder, and nothing else.
     if (::rename(temporary_.c_str(), target_.c_str()) != 0)
-      fail(path_, errno);
+      io::failToWrite(path_, errno);
     temporary_.clear();
   }
 
@@ -120,13 +113,13 @@ private:
     if (::mkdir(temporary_.c_str(), kAsUsual) != 0) {
       if (errno == EEXIST)
         return false;
-      fail(path_, errno);
+      io::failToWrite(path_, errno);
     }
     descriptor_ = openFolder(temporary_);
     if (descriptor_ < 0) {
       const int error = errno;
       ::rmdir(temporary_.c_str());
-      fail(path_, error);
+      io::failToWrite(path_, error);
     }
     lock(descriptor_); // where folders cannot be locked, none is taken for left over
     struct stat folder {};

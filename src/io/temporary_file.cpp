@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <cstring>
 #include <mutex>
+#include <stdexcept>
 #include <system_error>
 
 namespace holdfast::io {
@@ -271,6 +272,13 @@ TemporaryFile::publish()
     return;
   ::fsync(folder); // the name, as far as the file system can
   ::close(folder);
+}
+
+void
+failToWrite(const std::string& path, int error)
+{
+  throw std::runtime_error(
+      path + ": cannot be written: " + std::generic_category().message(error));
 }
 
 void

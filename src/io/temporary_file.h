@@ -38,6 +38,9 @@ private:
 /// The name that the n-th writer of `target` uses meanwhile.
 std::string temporaryName(const std::string& target, int n);
 
+/// \param error of the system \throw std::runtime_error that names path and cause
+[[noreturn]] void failToWrite(const std::string& path, int error);
+
 /// Removes all that were not published. Async-signal-safe.
 void removeAllTemporaries() noexcept;
 

@@ -17,7 +17,7 @@ constexpr std::size_t kMostSamples = 1000;
 // Where each costs a pass over all points: medians of so few are good to a quarter.
 constexpr std::size_t kMostSearches = 100, kFewestSearches = 16;
 constexpr std::size_t kMostDistances = 5'000'000;
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float kNoDistance = std::numeric_limits<float>::infinity();
 
 double
 median(std::vector<double>& values)
@@ -45,7 +45,7 @@ float
 squaredDistance(const pcl::PointXYZ& a, const pcl::PointXYZ& b)
 {
   const float squared = (a.getVector3fMap() - b.getVector3fMap()).squaredNorm();
-  return squared > 0.0F ? squared : kInfinity;
+  return squared > 0.0F ? squared : kNoDistance;
 }
 
 float
@@ -53,7 +53,7 @@ nearestInImage(const Cloud& cloud, int index)
 {
   const int width = static_cast<int>(cloud.width);
   const int u = index % width, v = index / width;
-  float nearest = kInfinity;
+  float nearest = kNoDistance;
   for (const auto& [du, dv] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
     const bool inside = u + du >= 0 && u + du < width && v + dv >= 0 &&
                         v + dv < static_cast<int>(cloud.height);
@@ -66,7 +66,7 @@ nearestInImage(const Cloud& cloud, int index)
 float
 nearestOfAll(const Cloud& cloud, int index)
 {
-  float nearest = kInfinity;
+  float nearest = kNoDistance;
   for (const pcl::PointXYZ& other : cloud)
     nearest = std::min(nearest, squaredDistance(cloud[index], other));
   return nearest;
@@ -84,7 +84,7 @@ spacingOf(const Cloud& cloud, const std::vector<int>& valid, bool organized)
   for (const int index : sampleOf(valid, affordable)) {
     const float squared =
         organized ? nearestInImage(cloud, index) : nearestOfAll(cloud, index);
-    if (squared < kInfinity)
+    if (squared < kNoDistance)
       distances.push_back(std::sqrt(squared));
   }
   return median(distances);

@@ -12,9 +12,6 @@ namespace holdfast {
 
 namespace {
 
-/// Worse than this and the pixels are not those of the camera.
-constexpr double kMaxResidualPx = 2.0;
-
 struct FittedCamera {
   Camera camera;
   double rms_px = 0.0;

@@ -11,6 +11,9 @@
 
 namespace holdfast {
 
+/// Of pixelResidual(): worse than this and the pixels are not those of the camera.
+inline constexpr double kMaxResidualPx = 2.0;
+
 struct PixelGrid {
   Camera camera; ///< width and height are those of the cloud
   double margin_px = 0.0; ///< how far a point may lie from the pixel it was measured in

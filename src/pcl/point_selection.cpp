@@ -1,5 +1,6 @@
 #include "point_selection.h"
 
+#include "pixel_grid.h"
 #include "unused_points.h"
 #include "view_check.h"
 
@@ -62,7 +63,6 @@ dropInvalidCovariances(const RangeCloud& cloud, UnusedPoints& unused)
 bool
 isImage(const RangeCloud& cloud, const Sensor& sensor)
 {
-  constexpr double kMaxResidualPx = 2.0;
   if (cloud.points->height < 2)
     return false;
   const auto residual = pixelResidual(cloud, sensor.camera);

@@ -1,3 +1,4 @@
+#include <holdfast/geometry/constants.h>
 #include <holdfast/simulation/reference_scenes.h>
 
 #include "sensor/require.h"
@@ -10,8 +11,6 @@
 namespace holdfast {
 
 namespace {
-
-constexpr double kPi = 3.141592653589793;
 
 /// Boundary and curvature parameters of one patch.
 struct Intrinsics {

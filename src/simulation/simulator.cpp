@@ -1,3 +1,4 @@
+#include <holdfast/geometry/constants.h>
 #include <holdfast/geometry/gaussian.h>
 #include <holdfast/simulation/simulator.h>
 
@@ -12,8 +13,6 @@
 namespace holdfast {
 
 namespace {
-
-constexpr double kPi = 3.141592653589793;
 
 Eigen::Vector3d
 nanVector()

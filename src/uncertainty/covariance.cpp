@@ -7,6 +7,7 @@
 #include "second_order.h"
 #include "stagewise.h"
 
+#include <holdfast/geometry/constants.h>
 #include <holdfast/geometry/gaussian.h>
 #include <holdfast/geometry/rotation.h>
 #include <holdfast/uncertainty/monte_carlo.h>
@@ -442,7 +443,6 @@ bool
 isAtEndOfChart(const Patch& patch, double tilt_sigma)
 {
   constexpr double kFarInSigmas = 10.0;
-  constexpr double kPi = 3.14159265358979323846;
   return isRevolute(patch.type) && kPi - patch.r.norm() < kFarInSigmas * tilt_sigma;
 }
 

@@ -112,7 +112,7 @@ def test_union_and_joint_and_pose(rng, foot):
     np.testing.assert_allclose(risk.pose[:2, 3], patch.centre[:2], atol=1e-9)
     values = np.linalg.eigvalsh(risk.pose_covariance)
     assert values.min() > -1e-12 and np.sum(values > 1e-6 * values.max()) == 3
-    assert risk.assumptions == holdfast.RISK_ASSUMPTIONS and len(risk.assumptions) == 6
+    assert risk.assumptions == holdfast.RISK_ASSUMPTIONS and len(risk.assumptions) == 7
 
 
 def test_rough_measurements_are_riskier(rng, foot):

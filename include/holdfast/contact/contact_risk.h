@@ -20,8 +20,10 @@
 namespace holdfast {
 
 /// Written beside every result.
-inline constexpr std::array<std::string_view, 6> kRiskAssumptions{
+inline constexpr std::array<std::string_view, 7> kRiskAssumptions{
     "the surface is rigid and bears the load wherever it was seen",
+    "what was seen is what the one patch under the planned point covers: ground under "
+    "the sole that only its neighbours cover counts as not seen",
     "errors of a surface are Gaussian with the covariance of its patch; its slope and "
     "curvatures, and what of it is no quadric, are those of a kind of surface in the "
     "map",

@@ -89,7 +89,7 @@ struct Cylinder : ModelBase<kernel::Model::Cylinder> {
   // I-2 (ii), s = circular cylinder: z' = normalise(n - x x^T n) (paper eq. (5): [x y
   // z] is a rotation only with z normal to x), apex on the axis' near side. None when n
   // is along the axis.
-  static std::optional<Placement> place(const PlacementRequest& request)
+  static std::optional<SurfacePlacement> place(const PlacementRequest& request)
   {
     constexpr double kSmallestSine = 1e-3;
     const UnboundedSurface& surface = request.surface;
@@ -105,7 +105,7 @@ struct Cylinder : ModelBase<kernel::Model::Cylinder> {
     // n seen from the moving frame, and its turn about x.
     const JointRows3 dn = normal.dn + skew(normal.n) * tilt;
     const JointRow roll = (up.y() * dn.row(2) - up.z() * dn.row(1)) / across;
-    Placement p{surface.R, surface.c + surface.R * (z - up) / k, surface.R * up};
+    SurfacePlacement p{surface.R, surface.c + surface.R * (z - up) / k, surface.R * up};
     p.R.col(2) = p.z;
     p.R.col(1) = p.R.col(2).cross(p.R.col(0));
     p.delta = tilt;

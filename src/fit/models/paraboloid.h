@@ -84,12 +84,12 @@ struct Paraboloid : ModelBase<kernel::Model::Paraboloid> {
   }
 
   // delta and gamma of the paraboloid's frame, I-2: c = mean + a n.
-  static std::optional<Placement> place(const PlacementRequest& request)
+  static std::optional<SurfacePlacement> place(const PlacementRequest& request)
   {
     const UnboundedSurface& surface = request.surface;
     // The line of its centre is the scatter's normal, whatever else there is.
     const NormalMap normal = normalMap({surface, request.scatter, nullptr, false});
-    Placement p{surface.R, surface.c, surface.R.col(2)};
+    SurfacePlacement p{surface.R, surface.c, surface.R.col(2)};
     p.delta(0, 3) = p.delta(1, 4) = 1.0;
     p.gamma.middleCols<3>(JointLayout::kMean).setIdentity();
     p.gamma += surface.a * normal.dn;

@@ -55,10 +55,10 @@ struct Plane : ModelBase<kernel::Model::Plane> {
     return Eigen::Vector3d::Zero();
   }
 
-  static std::optional<Placement> place(const PlacementRequest& request)
+  static std::optional<SurfacePlacement> place(const PlacementRequest& request)
   {
     const UnboundedSurface& surface = request.surface;
-    Placement p{surface.R, surface.c, surface.R.col(2)};
+    SurfacePlacement p{surface.R, surface.c, surface.R.col(2)};
     p.delta(0, 0) = p.delta(1, 1) = 1.0;
     p.gamma(2, 2) = 1.0;
     return p;

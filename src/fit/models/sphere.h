@@ -65,7 +65,7 @@ struct Sphere : ModelBase<kernel::Model::Sphere> {
     return Eigen::Vector3d::UnitX();
   }
 
-  static std::optional<Placement> place(const PlacementRequest& request)
+  static std::optional<SurfacePlacement> place(const PlacementRequest& request)
   {
     if (request.centre_on_normal_line)
       if (const auto placed = placeOnNormalLine(request))
@@ -78,7 +78,8 @@ private:
   // sphere's own normal there. It is where the points are, however little they know of
   // the centre: an apex along the normal from there slides with 1/k. None where the
   // line misses the sphere.
-  static std::optional<Placement> placeOnNormalLine(const PlacementRequest& request)
+  static std::optional<SurfacePlacement> placeOnNormalLine(
+      const PlacementRequest& request)
   {
     const UnboundedSurface& surface = request.surface;
     const NormalMap normal = normalMap(request);
@@ -105,7 +106,7 @@ private:
     dD[0] -= 2.0 / (k * k * k);
     const JointRow ds = -dalong - dD / (2.0 * root);
     const Eigen::Vector3d c = mean + s * n, z = -k * (e + s * n);
-    Placement p{surface.R, surface.c + surface.R * c, surface.R * z};
+    SurfacePlacement p{surface.R, surface.c + surface.R * c, surface.R * z};
     p.gamma = dmean + n * ds + s * normal.dn;
     JointRows3 dz = -k * (de + n * ds + s * normal.dn);
     dz.col(0) += z / k;
@@ -116,15 +117,15 @@ private:
 
   // I-2 (ii), s = sphere: apex c = centre - n/k, centre = c_fit + z/k
   // (paper eq. (4) with the missing terms dc = dC + n dk/k^2 - dn/k).
-  static std::optional<Placement> placeApex(const PlacementRequest& request)
+  static std::optional<SurfacePlacement> placeApex(const PlacementRequest& request)
   {
     const UnboundedSurface& surface = request.surface;
     const NormalMap normal = normalMap(request);
     const double k = safeGap(surface.k[0], 1.0);
     const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
-    Placement p{surface.R,
-                surface.c + surface.R * (z - normal.n) / k,
-                surface.R * normal.n};
+    SurfacePlacement p{surface.R,
+                       surface.c + surface.R * (z - normal.n) / k,
+                       surface.R * normal.n};
     p.gamma = normal.dn / -k;
     p.gamma.middleCols<3>(1) += Eigen::Matrix3d::Identity();
     p.gamma.col(0) += (normal.n - z) / (k * k);

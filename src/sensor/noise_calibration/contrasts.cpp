@@ -8,8 +8,6 @@
 namespace holdfast {
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-
 std::vector<ContrastStep>
 makeSteps()
 {
@@ -118,7 +116,7 @@ meanOf(const std::vector<std::vector<float>>& frames, std::size_t i)
       sum += static_cast<double>(frame[i]);
       ++count;
     }
-  return count > 0 ? static_cast<float>(sum / count) : kNaN;
+  return count > 0 ? static_cast<float>(sum / count) : kUnknownDisparity;
 }
 
 void
@@ -153,8 +151,8 @@ planeImages(const DisparityStack& stack,
   const auto pixels = static_cast<std::size_t>(images.width * images.height);
   images.plane.assign(pixels, 0);
   images.frames.assign(static_cast<std::size_t>(stack.frames()),
-                       std::vector<float>(pixels, kNaN));
-  images.mean.assign(pixels, kNaN);
+                       std::vector<float>(pixels, kUnknownDisparity));
+  images.mean.assign(pixels, kUnknownDisparity);
   std::int16_t number = 0;
   for (const Region& plane : planes) {
     ++number;

@@ -28,8 +28,6 @@ constexpr float kNormalMad = 1.4826F; // sigma over the median absolute deviatio
 // Pixels with less than this part of a pose in their neighbourhood are unknown.
 constexpr float kLeastSeen = 0.5F;
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-
 double
 shrinkageOf(int k)
 {
@@ -56,7 +54,7 @@ residualsOf(const PlaneImages& images, std::size_t planes)
   std::vector<DisparityPlane> fitted;
   for (const PlaneMoments& sum : moments)
     fitted.push_back(sum.hasPlane() ? sum.plane() : DisparityPlane{});
-  std::vector<float> residuals(images.mean.size(), kNaN);
+  std::vector<float> residuals(images.mean.size(), kUnknownDisparity);
   forEachPixel([&](std::size_t i, std::size_t plane, const Eigen::Vector2d& at) {
     if (moments[plane].hasPlane())
       residuals[i] =
@@ -206,7 +204,7 @@ public:
     const Eigen::ArrayXXf means =
         (sums.poses >= kLeastSeen)
             .select(sums.residuals / (sums.poses + static_cast<float>(shrinkage)),
-                    kNaN);
+                    kUnknownDisparity);
     return {width_, height_, {means.data(), means.data() + means.size()}};
   }
 

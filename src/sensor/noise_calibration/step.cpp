@@ -30,7 +30,7 @@ constexpr double kClearlyStronger = 0.01;
 constexpr double kMostSteps = 8.0;
 
 // Differences below are none, but for the single precision of the points.
-constexpr double kSinglePrecision = 1e-6;
+constexpr double kRounding = 1e-6;
 
 /// Multiples of one number, as far as there is one.
 struct Comb {
@@ -143,7 +143,7 @@ crossDifferences(const DisparityStack& stack,
       return value(static_cast<double>(stack.disparity(frame, u + du, v + dv)));
     };
     const double cross = at(0, 0) - at(kLag, 0) - at(0, kLag) + at(kLag, kLag);
-    if (std::abs(cross) > kSinglePrecision * at(0, 0)) // not for NaN
+    if (std::abs(cross) > kRounding * at(0, 0)) // not for NaN
       differences.add(cross);
   });
   return differences.values();

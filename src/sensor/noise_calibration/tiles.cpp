@@ -20,8 +20,6 @@ constexpr double kLeastTileShare = 0.75; // of its pixels
 constexpr double kLargestVarianceRatio = 4.0;
 constexpr std::ptrdiff_t kNeighborsInDepth = 25; // on either side
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-
 template <typename Number>
 Number
 medianOf(std::vector<Number>& values)
@@ -70,8 +68,9 @@ DisparityStack::DisparityStack(const std::vector<PointImage>& frames,
     std::vector<float>& disparities = frames_.emplace_back();
     disparities.reserve(frame.points.size());
     for (const Eigen::Vector3f& q : frame.points)
-      disparities.push_back(
-          q.allFinite() && q.z() > 0.0F ? static_cast<float>(fb / q.z()) : kNaN);
+      disparities.push_back(q.allFinite() && q.z() > 0.0F ?
+                                static_cast<float>(fb / q.z()) :
+                                kUnknownDisparity);
   }
   if (this->frames() > 1)
     dropWhatMoved();
@@ -127,16 +126,16 @@ DisparityStack::dropWhatMoved()
     for (const auto& frame : frames_)
       if (std::isfinite(frame[i]))
         values.push_back(frame[i]);
-    const float median = values.empty() ? kNaN : medianOf(values);
+    const float median = values.empty() ? kUnknownDisparity : medianOf(values);
     std::size_t kept = 0;
     for (auto& frame : frames_) {
       if (!(std::abs(frame[i] - median) <= limit))
-        frame[i] = kNaN;
+        frame[i] = kUnknownDisparity;
       kept += std::isfinite(frame[i]);
     }
     if (kept < 2 || 2 * kept < frames_.size())
       for (auto& frame : frames_)
-        frame[i] = kNaN;
+        frame[i] = kUnknownDisparity;
   }
 }
 

@@ -5,9 +5,13 @@
 
 #include <holdfast/sensor/noise_calibration.h>
 
+#include <limits>
 #include <vector>
 
 namespace holdfast {
+
+/// Of a pixel without one.
+inline constexpr float kUnknownDisparity = std::numeric_limits<float>::quiet_NaN();
 
 inline constexpr int kTileSize = 8; // px
 
