@@ -1,5 +1,6 @@
 #include "core/session.h"
 
+#include <holdfast/geometry/constants.h>
 #include <holdfast/io/config.h>
 #include <holdfast/io/foot_file.h>
 #include <holdfast/pcl/intrinsics.h>
@@ -33,6 +34,7 @@ extractionOptions(const Settings& settings, const Tuning& tuning, const Foot& fo
   options.sampler.max_time_s = 1e-3 * tuning.budget_ms;
   options.validation->max_chi2_per_dof = tuning.max_chi2_per_dof;
   options.validation->min_coverage = tuning.min_coverage;
+  options.validation->max_view_angle_rad = tuning.max_view_angle_deg * kPi / 180.0;
   if (tuning.max_curvature_per_m > 0.0)
     options.validation->max_curvature_per_m = tuning.max_curvature_per_m;
   return options;
@@ -49,12 +51,19 @@ sumOf(const Counts& counts)
 }
 
 bool
-isSame(const std::optional<Camera>& a, const std::optional<Camera>& b)
+isSame(const Camera& a, const Camera& b)
 {
-  if (!a || !b)
-    return a.has_value() == b.has_value();
-  return a->width == b->width && a->height == b->height && a->fx == b->fx &&
-         a->fy == b->fy && a->cx == b->cx && a->cy == b->cy;
+  return a.width == b.width && a.height == b.height && a.fx == b.fx && a.fy == b.fy &&
+         a.cx == b.cx && a.cy == b.cy;
+}
+
+/// Or has no pixels.
+bool
+hasSizeOf(const RangeCloud& cloud, const Camera& camera)
+{
+  return cloud.points->height < 2 ||
+         (static_cast<int>(cloud.points->width) == camera.width &&
+          static_cast<int>(cloud.points->height) == camera.height);
 }
 
 } // namespace
@@ -93,7 +102,7 @@ void
 Session::startAnew()
 {
   options_ = extractionOptions(settings_, taken_, foot_);
-  matched_ = camera_ ? withCamera(sensor_, *camera_) : sensor_;
+  matched_.reset();
   extractor_.reset();
   mapper_.reset();
   last_pose_.reset();
@@ -137,13 +146,22 @@ Session::watchTime(const Frame& frame, Answer& answer)
   last_stamp_ = stamp;
 }
 
+/// The camera of a frame is that which came with it; else the points of the first frame
+/// of a size tell it.
 void
-Session::watchCamera(const Frame& frame)
+Session::watchCamera(const RangeCloud& cloud, const std::optional<Camera>& camera)
 {
-  if (isSame(camera_, frame.camera))
+  if (camera) {
+    if (!matched_ || !isSame(matched_->camera, *camera))
+      startAnew();
+    if (!matched_)
+      matched_ = withCamera(sensor_, *camera);
     return;
-  camera_ = frame.camera;
+  }
+  if (matched_ && hasSizeOf(cloud, matched_->camera))
+    return;
   startAnew();
+  matched_ = matchedSensor(sensor_, cloud);
 }
 
 Pose
@@ -164,7 +182,7 @@ Session::find(const std::string& target, const std::string& source, Stamp stamp)
 
 /// The cloud with the pose of its sensor, less the sensor's map of errors.
 RangeCloud
-Session::placed(const Frame& frame) const
+Session::placed(const Frame& frame)
 {
   if (!frame.unreadable.empty())
     throw FrameError(Trouble::Unreadable, frame.unreadable);
@@ -178,14 +196,15 @@ Session::placed(const Frame& frame) const
           turn :
           find(frame_id, settings_.sensor_frame, frame.header.stamp) * turn;
   cloud.sensor_pose_given = true;
-  if (!mayBeSeenBy(cloud, matched_))
+  watchCamera(cloud, frame.camera);
+  if (!mayBeSeenBy(cloud, *matched_))
     throw FrameError(
         Trouble::WrongFrame,
         fmt::format("most points of a cloud in frame '{}' lie where the sensor {} "
                     "cannot see: its frame, axes or unit are others than said",
                     frame_id,
                     sensor_.name));
-  return subtractPatternMap(cloud, matched_);
+  return subtractPatternMap(cloud, *matched_);
 }
 
 Answer
@@ -197,7 +216,6 @@ Session::answer(const Frame& frame)
   try {
     takeTuning(answer);
     watchTime(frame, answer);
-    watchCamera(frame);
     const RangeCloud cloud = placed(frame);
     if (settings_.map)
       answerMap(cloud, answer);
@@ -236,9 +254,9 @@ void
 Session::answerFrame(const RangeCloud& cloud, Answer& answer)
 {
   if (options_.sampler.max_patches == 0 || cloud.points->height < 2)
-    return takeResult(extractPatches(cloud, matched_, options_), answer);
+    return takeResult(extractPatches(cloud, *matched_, options_), answer);
   if (!extractor_)
-    extractor_.emplace(matched_, options_);
+    extractor_.emplace(*matched_, options_);
   takeResult(extractor_->extract(cloud), answer);
 }
 
@@ -248,7 +266,7 @@ Session::answerRisk(const RangeCloud& cloud, Answer& answer)
 {
   ExtractionResult result;
   const PatchMap map =
-      mapOfCloud(cloud, matched_, mappingOptionsFor(matched_, options_), &result);
+      mapOfCloud(cloud, *matched_, mappingOptionsFor(*matched_, options_), &result);
   takeResult(std::move(result), answer);
   rank(map, loadIn(cloud, answer.header), answer);
 }
@@ -313,10 +331,10 @@ Session::answerMap(const RangeCloud& cloud, Answer& answer)
 FrameReport
 Session::addToMap(const RangeCloud& cloud, const Header& header)
 {
-  const MappingOptions options = mappingOptionsFor(matched_, options_);
+  const MappingOptions options = mappingOptionsFor(*matched_, options_);
   if (settings_.odometry_frame.empty()) {
     if (!mapper_)
-      mapper_.emplace(matched_, options);
+      mapper_.emplace(*matched_, options);
     return mapper_->addUnknown(cloud);
   }
   const Pose pose =
@@ -325,7 +343,7 @@ Session::addToMap(const RangeCloud& cloud, const Header& header)
     PatchMap::Snapshot empty;
     empty.options = options.map;
     empty.pose = pose;
-    mapper_.emplace(matched_, options, PatchMap(empty));
+    mapper_.emplace(*matched_, options, PatchMap(empty));
   }
   FrameReport report = addMoved(cloud, header, pose);
   last_pose_ = pose;

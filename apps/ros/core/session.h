@@ -110,9 +110,9 @@ private:
   void startAnew();
   void takeTuning(Answer& answer);
   void watchTime(const Frame& frame, Answer& answer);
-  void watchCamera(const Frame& frame);
+  void watchCamera(const RangeCloud& cloud, const std::optional<Camera>& camera);
   Pose find(const std::string& target, const std::string& source, Stamp stamp) const;
-  RangeCloud placed(const Frame& frame) const;
+  RangeCloud placed(const Frame& frame);
   void answerFrame(const RangeCloud& cloud, Answer& answer);
   void answerRisk(const RangeCloud& cloud, Answer& answer);
   void answerMap(const RangeCloud& cloud, Answer& answer);
@@ -141,8 +141,7 @@ private:
   Tuning taken_; ///< the tuning that the rest was made for
   std::optional<VelocityError> velocity_taken_;
   ExtractionOptions options_;
-  std::optional<Camera> camera_; ///< of the frames
-  Sensor matched_; ///< with that camera
+  std::optional<Sensor> matched_; ///< with the camera of the frames
   std::optional<FrameExtractor> extractor_;
   std::optional<FrameMapper> mapper_;
   std::optional<Stamp> last_stamp_;

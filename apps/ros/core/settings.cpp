@@ -14,6 +14,7 @@ asTuple(const Tuning& t)
                   t.budget_ms,
                   t.max_chi2_per_dof,
                   t.min_coverage,
+                  t.max_view_angle_deg,
                   t.max_curvature_per_m);
 }
 
@@ -44,6 +45,8 @@ validityError(const Tuning& tuning)
     return "max_chi2_per_dof must be positive";
   if (!(tuning.min_coverage >= 0.0 && tuning.min_coverage <= 1.0))
     return "min_coverage must lie between 0 and 1";
+  if (!(tuning.max_view_angle_deg > 0.0 && tuning.max_view_angle_deg <= 90.0))
+    return "max_view_angle must lie between 0 and 90 degrees";
   if (!isNonNegative(tuning.max_curvature_per_m))
     return "max_curvature must not be negative";
   return {};

@@ -22,6 +22,7 @@ struct Tuning {
   double budget_ms = 25.0; ///< start no new patch after this; 0: no limit
   double max_chi2_per_dof = 3.0; ///< ValidationOptions, as the next two
   double min_coverage = 0.5;
+  double max_view_angle_deg = 85.0; ///< the same
   double max_curvature_per_m = 0.0; ///< 0: no limit
 };
 

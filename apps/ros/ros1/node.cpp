@@ -101,6 +101,7 @@ Node::toTuning(const ::holdfast::HoldfastConfig& config)
   tuning.budget_ms = config.budget_ms;
   tuning.max_chi2_per_dof = config.max_chi2_per_dof;
   tuning.min_coverage = config.min_coverage;
+  tuning.max_view_angle_deg = config.max_view_angle;
   tuning.max_curvature_per_m = config.max_curvature;
   return tuning;
 }

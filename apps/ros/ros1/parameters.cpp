@@ -22,6 +22,7 @@ const std::set<std::string> kDynamicNames{"radius",
                                           "budget_ms",
                                           "max_chi2_per_dof",
                                           "min_coverage",
+                                          "max_view_angle",
                                           "max_curvature"};
 
 /// Reads parameters and remembers which.
