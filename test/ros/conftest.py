@@ -38,3 +38,20 @@ def walk(scratch):
     """Frames of a walk over boulders: points, files, poses with their times."""
     files, poses = ros_world.simulate(scratch / "walk", 6)
     return [ros_world.read_pcd(path) for path in files], files, poses
+
+
+@pytest.fixture
+def link(world, request):
+    """Makes nodes with their topics, and stops them in the end."""
+    from messages import Link
+    links = []
+
+    def make(*arguments, **topics):
+        name = "".join(c if c.isalnum() else "_" for c in request.node.name)
+        links.append(Link(world, f"{name}_{len(links)}", *arguments, **topics))
+        return links[-1]
+
+    yield make
+    for one in links:
+        if one.node.is_alive():
+            one.close()

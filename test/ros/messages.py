@@ -8,6 +8,7 @@ import sensor_msgs.msg
 import tf2_msgs.msg
 
 import ros_world
+from holdfast_msgs.msg import PatchArray
 
 
 def stamp(seconds):
@@ -38,19 +39,28 @@ def transform(parent, child, seconds, pose):
     return tf2_msgs.msg.TFMessage([message])
 
 
+CLOUD = {"cloud": sensor_msgs.msg.PointCloud2}
+PATCHES = {"patches": PatchArray}
+TF = {"/tf": tf2_msgs.msg.TFMessage}
+
+
 class Link:
     """A node of ours with all its topics connected to this process."""
 
-    def __init__(self, world, name, *arguments, inputs=None, outputs=None):
-        self.node = world.start(name, *[f"{old}:=/{name}/{old}" for old in (inputs or {})],
-                                *arguments)
-        self.publishers = {
-            topic: rospy.Publisher(f"/{name}/{topic}", kind, queue_size=1000)
-            for topic, kind in (inputs or {}).items()}
-        self.answers = {topic: queue.Queue() for topic in (outputs or {})}
+    def __init__(self, world, name, *arguments, inputs=CLOUD, outputs=PATCHES):
+        def full(topic):
+            return topic if topic.startswith("/") else f"/{name}/{topic}"
+
+        remapped = [f"{topic}:={full(topic)}" for topic in inputs
+                    if not topic.startswith("/")]
+        self.name = name
+        self.node = world.start(name, *remapped, *arguments)
+        self.publishers = {topic: rospy.Publisher(full(topic), kind, queue_size=1000)
+                           for topic, kind in inputs.items()}
+        self.answers = {topic: queue.Queue() for topic in outputs}
         self.subscribers = [
-            rospy.Subscriber(f"/{name}/{topic}", kind, self.answers[topic].put)
-            for topic, kind in (outputs or {}).items()]
+            rospy.Subscriber(full(topic), kind, self.answers[topic].put)
+            for topic, kind in outputs.items()]
         ros_world.wait_until(self.is_connected, f"connection to {name}")
 
     def is_connected(self):
@@ -71,17 +81,25 @@ class Link:
         self.send(topic, message)
         return self.get()
 
+    def ask_until_good(self, message, topic="cloud"):
+        def good():
+            answer = self.ask(message, topic)
+            return None if answer.problem else answer
+
+        return ros_world.wait_until(good, "answer without a problem")
+
     def close(self):
         """Stops the node, which must have gone well."""
         code = self.node.stop()
         for end in [*self.publishers.values(), *self.subscribers]:
             end.unregister()
-        assert code == 0, self.node.text()
+        assert code == 0, f"{code}: {self.node.text()}"
 
 
 def symmetric(numbers):
     """A covariance as a square."""
     size = int(round(len(numbers) ** 0.5))
     matrix = np.array(numbers).reshape(size, size)
-    np.testing.assert_array_equal(matrix, matrix.T)
+    # Sums that are the same but for their order.
+    np.testing.assert_allclose(matrix, matrix.T, rtol=1e-9)
     return matrix

@@ -149,6 +149,14 @@ def read_pcd(path):
         int(words["HEIGHT"]), int(words["WIDTH"]), 3).copy()
 
 
+def write_pcd(path, points):
+    height, width = points.shape[:2]
+    pathlib.Path(path).write_bytes(
+        f"VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {width}\n"
+        f"HEIGHT {height}\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {width * height}\n"
+        "DATA binary\n".encode() + points.astype("<f4").tobytes())
+
+
 def fit(path, *options):
     """What the program makes of a file."""
     return json.loads(run(PROGRAM, "fit", path, "--json", "-", "--quiet", *options))

@@ -3,6 +3,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <exception>
+#include <iostream>
 
 namespace {
 
@@ -39,7 +40,8 @@ main(int argc, char** argv)
     ros::spin();
   }
   catch (const std::exception& error) {
-    ROS_FATAL("%s", error.what());
+    // What ROS prints with has gone with the node.
+    std::cerr << "holdfast_node: " << error.what() << '\n';
     return EXIT_FAILURE;
   }
   return EXIT_SUCCESS;
