@@ -17,7 +17,7 @@ PROGRAM = BUILD / "bin/holdfast"
 NODE = BUILD / "bin/holdfast_node"
 # Of whatever is waited for: far beyond what a busy machine takes, so that only what never
 # comes fails.
-LIMIT_S = 300.0
+LIMIT_S = 120.0
 
 
 def wait_until(happened, what, limit_s=LIMIT_S):

@@ -167,6 +167,12 @@ def test_time_may_jump(walk, link):
     assert len(one.node.warnings()) == 1, one.node.text()
 
 
+def test_it_stops_while_it_waits_for_a_transform(walk, link):
+    one = link("_sensor_frame:=camera", "_transform_timeout:=1000000")
+    one.send("cloud", cloud(walk[0][0], 5.0, "base"))
+    one.close()
+
+
 def test_newer_frames_replace_those_that_wait_and_are_counted(walk, link):
     points = walk[0][0]
     one = link(*WHOLE)
