@@ -184,8 +184,7 @@ private:
     if (!before)
       return mapper_->addStill(cloud);
     const Pose increment = before->inverse() * poses[index];
-    constexpr double kStill = 1e-9; // m and rad: rounding of a file
-    if (increment.c.norm() < kStill && increment.R.isIdentity(kStill))
+    if (isStill(increment))
       return mapper_->addStill(cloud);
     Motion motion{increment, JetMatrix::Zero()};
     const auto [rad, m] = settings_.pose_sigma;

@@ -12,22 +12,12 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <mutex>
 #include <stdexcept>
 
 namespace holdfast::app {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Patches that know the surface a little beyond the sole.
-double
-radiusFor(const Foot& foot)
-{
-  // Smaller patches have too few points of a depth camera at 1 m to be sure of a slope.
-  constexpr double kBeyond = 1.1, kLeast = 0.04; // share, m
-  return std::max(kBeyond * soleReach(foot), kLeast);
-}
 
 /// A patch as large as half of the cloud is none of the surface, and takes all points
 /// at each of its seeds. \throw std::runtime_error "PATH: cause".
@@ -50,34 +40,6 @@ requireRoomFor(double radius_m,
         box.diagonal().norm()));
 }
 
-/// A map of a cloud without rows and columns, which FrameMapper does not take.
-PatchMap
-mapOfPoints(const RangeCloud& cloud,
-            const Sensor& sensor,
-            const MappingOptions& options,
-            PatchMap map,
-            std::vector<std::string>& notices)
-{
-  ExtractionOptions extraction = options.extraction;
-  extraction.fit.surface = SurfaceRequest::Paraboloid;
-  extraction.fit.separate_pattern = true;
-  std::vector<Measurement> measurements;
-  std::mutex mutex;
-  PatchSites sites;
-  sites.observe =
-      [&](std::size_t attempt, const ExtractedPatch& patch, const PointBatch& points) {
-        auto measurement = measurementOf(patch.fit, points, cloud.sensor_pose);
-        if (!measurement)
-          return;
-        measurement->id = attempt + 1;
-        const std::lock_guard<std::mutex> lock(mutex);
-        measurements.push_back(*measurement);
-      };
-  notices = extractPatches(cloud, sensor, extraction, sites).notices;
-  map.update(measurements); // in whatever order
-  return map;
-}
-
 Ground
 groundOfCloud(const RiskSettings& settings, const Foot& foot)
 {
@@ -93,25 +55,18 @@ groundOfCloud(const RiskSettings& settings, const Foot& foot)
   ground.offset = cloud.offset;
   if (!cloud.sensor_pose_given || cloud.sensor_pose.R.isIdentity())
     ground.image_down = cloud.sensor_pose.R.col(1);
-  ground.radius_m = settings.radius_m.value_or(radiusFor(foot));
+  ground.radius_m = settings.radius_m.value_or(patchRadiusFor(foot));
   requireRoomFor(ground.radius_m, *cloud.points, settings.source);
 
   ExtractionOptions extraction;
   extraction.sampler.radius_m = ground.radius_m;
   extraction.threads = settings.footholds.threads;
   const MappingOptions options = mappingOptionsFor(taken_by, extraction);
-  PatchMap::Snapshot empty;
-  empty.options = options.map;
-  empty.pose = cloud.sensor_pose; // the frame of the map is that of the cloud
-  std::vector<std::string> notices;
-  if (cloud.points->height < 2)
-    ground.map = mapOfPoints(cloud, taken_by, options, PatchMap(empty), notices);
-  else {
-    FrameMapper mapper(taken_by, options, PatchMap(empty));
-    notices = mapper.addStill(cloud).extraction.notices;
-    ground.map = mapper.map();
-  }
-  ground.notices.insert(ground.notices.end(), notices.begin(), notices.end());
+  ExtractionResult result;
+  ground.map = mapOfCloud(cloud, taken_by, options, &result);
+  ground.notices.insert(ground.notices.end(),
+                        result.notices.begin(),
+                        result.notices.end());
   return ground;
 }
 

@@ -131,4 +131,11 @@ soleReach(const Foot& foot)
   return reach;
 }
 
+double
+patchRadiusFor(const Foot& foot)
+{
+  constexpr double kBeyond = 1.1, kLeast = 0.04; // share, m
+  return std::max(kBeyond * soleReach(foot), kLeast);
+}
+
 } // namespace holdfast

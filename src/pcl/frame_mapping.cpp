@@ -84,6 +84,31 @@ poseCovariance(const RegistrationResult& result, const JetMatrix& prior)
   return result.covariance + N * inverse * N.transpose();
 }
 
+/// FrameMapper does not take clouds without rows and columns.
+PatchMap
+mapOfPoints(const RangeCloud& cloud,
+            const Sensor& sensor,
+            const MappingOptions& options,
+            PatchMap map,
+            ExtractionResult& extraction)
+{
+  std::vector<Measurement> measurements;
+  std::mutex mutex;
+  PatchSites sites;
+  sites.observe =
+      [&](std::size_t attempt, const ExtractedPatch& patch, const PointBatch& points) {
+        auto measurement = measurementOf(patch.fit, points, cloud.sensor_pose);
+        if (!measurement)
+          return;
+        measurement->id = attempt + 1;
+        const std::lock_guard<std::mutex> lock(mutex);
+        measurements.push_back(*measurement);
+      };
+  extraction = extractPatches(cloud, sensor, extractionFor(options), sites);
+  map.update(measurements); // in whatever order
+  return map;
+}
+
 /// The motion that goes on like this one, for so many times as long.
 Pose
 power(const Pose& motion, double times)
@@ -92,6 +117,13 @@ power(const Pose& motion, double times)
 }
 
 } // namespace
+
+bool
+isStill(const Pose& increment)
+{
+  constexpr double kStill = 1e-9; // m and rad: rounding of a file
+  return increment.c.norm() < kStill && increment.R.isIdentity(kStill);
+}
 
 PatchMapOptions
 mapOptionsFor(const Sensor& sensor, PatchMapOptions options)
@@ -289,6 +321,26 @@ FrameMapper::moveByRegistration(const Measured& measured,
   }
   report.registration = std::move(result);
   return is_found;
+}
+
+PatchMap
+mapOfCloud(const RangeCloud& cloud,
+           const Sensor& sensor,
+           const MappingOptions& options,
+           ExtractionResult* extraction)
+{
+  if (const std::string error = validityError(cloud); !error.empty())
+    throw std::invalid_argument(error);
+  PatchMap::Snapshot empty;
+  empty.options = options.map;
+  empty.pose = cloud.sensor_pose; // the frame of the map is that of the cloud
+  ExtractionResult unwanted;
+  ExtractionResult& result = extraction ? *extraction : unwanted;
+  if (cloud.points->height < 2)
+    return mapOfPoints(cloud, sensor, options, PatchMap(empty), result);
+  FrameMapper mapper(sensor, options, PatchMap(empty));
+  result = mapper.addStill(cloud).extraction;
+  return mapper.map();
 }
 
 } // namespace holdfast

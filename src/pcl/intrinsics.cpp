@@ -1,5 +1,7 @@
 #include <holdfast/pcl/intrinsics.h>
 
+#include "view_check.h"
+
 #include <pcl/common/point_tests.h>
 
 #include <fmt/core.h>
@@ -229,6 +231,13 @@ chooseSensorPose(const pcl::PointCloud<pcl::PointXYZ>::ConstPtr& points,
     *notice = "the points are in the camera frame: the sensor's orientation in the "
               "file, which contradicts them, is not used";
   return Pose{};
+}
+
+bool
+mayBeSeenBy(const RangeCloud& cloud, const Sensor& sensor)
+{
+  return (sensor.noise && sensor.noise->isOmnidirectional()) ||
+         !ViewCheck(cloud, sensor).isForeign();
 }
 
 Sensor

@@ -62,4 +62,8 @@ double soleArea(const Foot& foot); ///< m^2
 /// Distance of the farthest corner from the origin, m: patches must be known that far.
 double soleReach(const Foot& foot);
 
+/// Radius of patches that know the surface a little beyond the sole, m; smaller ones
+/// than 4 cm have too few points of a depth camera at 1 m to be sure of a slope.
+double patchRadiusFor(const Foot& foot);
+
 } // namespace holdfast

@@ -18,6 +18,9 @@ struct Motion {
   JetMatrix covariance = JetMatrix::Zero();
 };
 
+/// The sensor has not moved, but for the rounding of poses: FrameMapper::addStill().
+bool isStill(const Pose& increment);
+
 struct MappingOptions {
   PatchMapOptions map;
   /// Seeds, neighbourhoods, acceptance. The fits are of paraboloids with the pattern
@@ -89,6 +92,14 @@ private:
   Pose step_; ///< from frame to frame, of the last motion that was found
   int frames_missed_ = 0; ///< since
 };
+
+/// The map of a single cloud, organized or not, in its frame.
+/// \param extraction if not null: receives the patches of the cloud as they are alone.
+/// \throw std::invalid_argument as FrameMapper and extractPatches().
+PatchMap mapOfCloud(const RangeCloud& cloud,
+                    const Sensor& sensor,
+                    const MappingOptions& options,
+                    ExtractionResult* extraction = nullptr);
 
 /// The options of a map for a sensor: how far the errors of its pixels reach.
 PatchMapOptions mapOptionsFor(const Sensor& sensor, PatchMapOptions options = {});

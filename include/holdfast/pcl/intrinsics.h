@@ -40,6 +40,11 @@ Pose chooseSensorPose(const pcl::PointCloud<pcl::PointXYZ>::ConstPtr& points,
                       const Pose& file_pose,
                       std::string* notice = nullptr);
 
+/// False when most points lie where the sensor cannot have measured them: the cloud has
+/// other axes or units, or its sensor pose is none. extractPatches() does not use the
+/// noise of the sensor then. True for sensors that see all around.
+bool mayBeSeenBy(const RangeCloud& cloud, const Sensor& sensor);
+
 /// The sensor with the camera of this cloud: when an organized cloud's points are more
 /// than 2 px rms (about 1 % of focal length) off the sensor's pixels, the recovered
 /// camera replaces the sensor's, with a one-line `notice`.
