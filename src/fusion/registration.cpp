@@ -1,6 +1,7 @@
 #include <holdfast/fusion/registration.h>
 
 #include <holdfast/fusion/roughness.h>
+#include <holdfast/geometry/constants.h>
 #include <holdfast/geometry/gaussian.h>
 #include <holdfast/geometry/rotation.h>
 
@@ -10,6 +11,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -28,9 +31,12 @@ struct Match {
 /// What the map says of a measurement at a pose of the sensor.
 struct Pair : Match {
   JetVector residual; ///< measured less predicted, at the measurement's own anchor
+  JetMatrix own; ///< covariance of the residual without the pattern
   JetMatrix information; ///< of the residual
   JetMatrix by_pose; ///< of the prediction, by (delta, c) of the sensor
-  JetMatrix noise; ///< information on (delta, c) that errors of its slopes seem to be
+  /// What errors of its slopes alone seem to tell of (delta, c), for an information of
+  /// one on its height.
+  JetMatrix noise;
   double distance; ///< squared, of the residual in its sigmas
 };
 
@@ -100,22 +106,73 @@ likelyShape(const JetFilter& filter,
 /// What errors of slopes alone seem to tell of the pose: a step t within the plane of a
 /// patch moves its height by -g t, and so it does where g is nothing but noise.
 JetMatrix
-slopeNoise(const Pair& pair, const Eigen::Matrix2d& slopes, const JetMatrix& chain)
+slopeNoise(const Eigen::Matrix2d& slopes, const JetMatrix& chain)
 {
   const Eigen::Matrix<double, 2, 6> in_plane = chain.middleRows<2>(3);
-  return pair.information(0, 0) * in_plane.transpose() * slopes * in_plane;
+  return in_plane.transpose() * slopes * in_plane;
 }
 
 /// What a pair tells when others around have the same error. Of n alike, each with the
-/// pattern P and S beside it, the information of all is n (S + n P)^-1, as if the
-/// pattern of each were n times as large. What the map knows counts as its own.
+/// covariance S, the information of all is that of one, n (n S)^-1, as if S were n
+/// times as large. Of the pattern as many share it as its waves reach; of all else
+/// those that rest on the same points, as the map's patches do when the frame's do.
+/// \param overlap how many patches have a point of this one, itself included.
 JetMatrix
-sharedInformation(const Jet& jet, const JetMatrix& predicted, const JetVector& sharers)
+sharedInformation(const Pair& pair, double overlap)
 {
-  const JetVector root = sharers.cwiseSqrt();
-  const JetMatrix S =
-      jet.white + predicted + root.asDiagonal() * jet.pattern * root.asDiagonal();
+  JetMatrix S = overlap * pair.own;
+  if (pair.sharers) {
+    const JetVector root = pair.sharers->cwiseSqrt();
+    S += root.asDiagonal() * pair.measurement->jet.pattern * root.asDiagonal();
+  }
   return S.llt().solve(JetMatrix(JetMatrix::Identity()));
+}
+
+/// Share of a disc of radius a that another of radius b at a distance covers.
+double
+sharedDisc(double distance, double a, double b)
+{
+  if (distance >= a + b)
+    return 0.0;
+  const double smaller = std::min(a, b);
+  if (distance <= std::abs(a - b))
+    return smaller * smaller / (a * a);
+  // Two segments, each a sector less its triangle.
+  const auto segment = [](double r, double height) {
+    const double angle = std::acos(std::clamp(height / r, -1.0, 1.0));
+    return r * r * angle - height * std::sqrt(std::max(0.0, r * r - height * height));
+  };
+  const double to_chord = (distance * distance + a * a - b * b) / (2.0 * distance);
+  return (segment(a, to_chord) + segment(b, distance - to_chord)) / (kPi * a * a);
+}
+
+/// Of how many of the pairs a point of each is, on average.
+std::vector<double>
+overlapsAmong(const std::vector<Pair>& pairs)
+{
+  std::vector<std::size_t> order(pairs.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  const auto centre = [&](std::size_t i) -> const Eigen::Vector3d& {
+    return pairs[i].measurement->anchor.c;
+  };
+  const auto radius = [&](std::size_t i) { return pairs[i].measurement->radius_m; };
+  std::sort(order.begin(), order.end(), [&](std::size_t i, std::size_t j) {
+    return std::pair(centre(i).x(), i) < std::pair(centre(j).x(), j);
+  });
+  double largest = 0.0;
+  for (const std::size_t i : order)
+    largest = std::max(largest, radius(i));
+  std::vector<double> overlaps(pairs.size(), 1.0);
+  for (std::size_t a = 0; a < order.size(); ++a)
+    for (std::size_t b = a + 1; b < order.size(); ++b) {
+      const std::size_t i = order[a], j = order[b];
+      if (centre(j).x() - centre(i).x() >= 2.0 * largest)
+        break;
+      const double distance = (centre(i) - centre(j)).norm();
+      overlaps[i] += sharedDisc(distance, radius(i), radius(j));
+      overlaps[j] += sharedDisc(distance, radius(j), radius(i));
+    }
+  return overlaps;
 }
 
 /// How many of a frame's measurements have the same error of the pattern as each.
@@ -171,11 +228,11 @@ pairAt(const Match& match, const PatchMap& map, const Pose& sensor, double curve
   const auto moved = movedJet(patch.jet.value(), relative, by_third);
   if (!moved)
     return std::nullopt;
-  Pair pair{match, m.jet.value - moved->value, {}, {}, {}, 0.0};
+  Pair pair{match, m.jet.value - moved->value, {}, {}, {}, {}, 0.0};
   const JetMatrix Q = modelError(m.design.by_third, by_third, map.roughnessOf(patch));
   const JetMatrix& F = moved->by_jet;
-  const JetMatrix predicted = F * patch.jet.covariance() * F.transpose();
-  const Eigen::LLT<JetMatrix> factor(JetMatrix(m.jet.covariance() + predicted + Q));
+  pair.own = m.jet.white + F * patch.jet.covariance() * F.transpose() + Q;
+  const Eigen::LLT<JetMatrix> factor(JetMatrix(pair.own + m.jet.pattern));
   if (factor.info() != Eigen::Success)
     return std::nullopt;
   pair.information = factor.solve(JetMatrix(JetMatrix::Identity()));
@@ -190,10 +247,7 @@ pairAt(const Match& match, const PatchMap& map, const Pose& sensor, double curve
   chain.bottomLeftCorner<3, 3>() = -to_patch * sensor.R * skew(m.anchor.c);
   chain.bottomRightCorner<3, 3>() = to_patch;
   pair.by_pose = shape->by_pose * chain;
-  if (match.sharers)
-    pair.information =
-        sharedInformation(m.jet, JetMatrix(predicted + Q), *match.sharers);
-  pair.noise = slopeNoise(pair, likely.slopes, chain);
+  pair.noise = slopeNoise(likely.slopes, chain);
   if (!pair.by_pose.allFinite() || !std::isfinite(pair.distance))
     return std::nullopt;
   return pair;
@@ -247,11 +301,12 @@ useEachPatchOnce(std::vector<Pair>& pairs)
 /// Sums over pairs, and the step that they ask for.
 class NormalEquations {
 public:
-  void add(const Pair& pair, double weight)
+  /// \param information of the pair, as far as it counts
+  void add(const Pair& pair, const JetMatrix& information)
   {
-    const JetMatrix weighted = weight * pair.information * pair.by_pose;
+    const JetMatrix weighted = information * pair.by_pose;
     information_ += weighted.transpose() * pair.by_pose;
-    noise_ += weight * pair.noise;
+    noise_ += information(0, 0) * pair.noise;
     gradient_ += weighted.transpose() * pair.residual;
   }
 
@@ -301,6 +356,16 @@ public:
   bool isAgainst(const JetVector& other) const
   {
     return step_.dot(information_ * other) < 0.0;
+  }
+
+  /// True where a share of the step has led to a place with less to go, in these sigmas
+  /// (the natural test of monotonicity).
+  bool leadsTo(const NormalEquations& next, double share) const
+  {
+    const JetVector left = covariance_ * next.gradient_;
+    constexpr double kLeast = 0.25; // of what a linear problem would leave less
+    return std::sqrt(left.dot(information_ * left)) <=
+           (1.0 - kLeast * share) * stepInSigmas();
   }
 
   /// Length of the step in sigmas.
@@ -389,6 +454,14 @@ public:
   }
 
 private:
+  static constexpr int kFreeSteps = 6; ///< of the gated ones, whose pairs may change
+
+  /// A step, and from where.
+  struct Taken {
+    Pose pose;
+    NormalEquations equations;
+  };
+
   /// One of Gauss and Newton.
   void step()
   {
@@ -405,43 +478,56 @@ private:
       result_.status = RegistrationStatus::NotObservable;
       return;
     }
-    if (!is_robust)
-      damp(equations);
-    result_.pose = moved(result_.pose, damping_ * equations.step());
-    if (!is_robust &&
-        damping_ * equations.stepInSigmas() <= options_.step_tolerance_sigma)
-      result_.status = RegistrationStatus::Converged;
     reach_ = std::max(last_reach_, 0.5 * reach_);
+    if (is_robust) {
+      result_.pose = moved(result_.pose, equations.step());
+      return;
+    }
+    // The whole step: what is damped says nothing of how far the way still is.
+    if (equations.stepInSigmas() <= options_.step_tolerance_sigma) {
+      result_.pose = moved(result_.pose, equations.step());
+      result_.status = RegistrationStatus::Converged;
+      return;
+    }
+    goOn(equations);
   }
 
   /// Curvatures without their noise are smaller than the true ones, so that steps may
-  /// be more than twice too long, and then never end.
-  void damp(const NormalEquations& equations)
+  /// be more than twice too long, and then never end. While pairs come and go a step
+  /// that goes back is halved; once they stay, one is refused that does not lead nearer
+  /// to where there is none to take. That, and not chi2: these derivatives are not its.
+  void goOn(const NormalEquations& equations)
   {
+    if (last_ && isSettled() && !last_->equations.leadsTo(equations, damping_)) {
+      damping_ *= 0.5;
+      result_.pose = moved(last_->pose, damping_ * last_->equations.step());
+      return;
+    }
     constexpr double kLeast = 0.25;
-    if (equations.isAgainst(last_step_))
+    if (!isSettled() && last_ && equations.isAgainst(last_->equations.step()))
       damping_ = std::max(kLeast, 0.5 * damping_);
-    last_step_ = equations.step();
+    // The first of the settled ones has no other with the same pairs to compare with.
+    last_ = Taken{result_.pose, equations};
+    result_.pose = moved(result_.pose, damping_ * equations.step());
+  }
+
+  bool isSettled() const
+  {
+    return gated_steps_ > kFreeSteps + 1;
   }
 
   /// Where the pose may be far off: patches of further around, none of them trusted.
   NormalEquations robustEquations()
   {
-    const std::vector<Pair> pairs = pairsAround(reach_);
-    NormalEquations equations;
-    for (const Pair& pair : pairs)
-      equations.add(pair, robustWeight(pair.distance, options_.robust_distance));
-    finish(pairs, equations);
-    return equations;
+    return equationsOf(pairsAround(reach_), options_.robust_distance);
   }
 
   /// Where it is near: as the map itself associates. Pairs that come and go at the gate
   /// may keep steps going for ever; after some, those of the last one stay.
   NormalEquations gatedEquations()
   {
-    constexpr int kFree = 6;
     std::vector<Pair> pairs;
-    if (++gated_steps_ <= kFree) {
+    if (++gated_steps_ <= kFreeSteps) {
       pairs = pairsAround(last_reach_);
       const auto passes = [&](const Pair& pair) {
         return pair.distance <= map_.gate();
@@ -454,11 +540,7 @@ private:
     else {
       pairs = pairsOf(kept_, map_, result_.pose);
     }
-    NormalEquations equations;
-    for (const Pair& pair : pairs)
-      equations.add(pair, 1.0);
-    finish(pairs, equations);
-    return equations;
+    return equationsOf(pairs, std::numeric_limits<double>::infinity());
   }
 
   std::vector<Pair> pairsAround(double reach_m) const
@@ -471,14 +553,21 @@ private:
     return pairs;
   }
 
-  void finish(const std::vector<Pair>& pairs, NormalEquations& equations)
+  NormalEquations equationsOf(const std::vector<Pair>& pairs, double robust_distance)
   {
+    const std::vector<double> overlaps = overlapsAmong(pairs);
+    NormalEquations equations;
     result_.pairs = static_cast<int>(pairs.size());
+    result_.chi2 = 0.0;
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      equations.add(pairs[i],
+                    robustWeight(pairs[i].distance, robust_distance) *
+                        sharedInformation(pairs[i], overlaps[i]));
+      result_.chi2 += pairs[i].distance;
+    }
     if (result_.pairs >= options_.min_pairs)
       equations.solve(lever_, options_.smallest_information);
-    result_.chi2 = 0.0;
-    for (const Pair& pair : pairs)
-      result_.chi2 += pair.distance;
+    return equations;
   }
 
   const std::vector<Measurement> measurements_;
@@ -488,7 +577,7 @@ private:
   double lever_, last_reach_, reach_;
   int gated_steps_ = 0;
   double damping_ = 1.0;
-  JetVector last_step_ = JetVector::Zero();
+  std::optional<Taken> last_;
   std::vector<Match> kept_;
   RegistrationResult result_;
 };
