@@ -20,7 +20,7 @@ leg() {
   printf '\n==== %s (after %d s)\n' "$1" "$SECONDS"
 }
 
-install_packages build python test
+install_packages build python test ros
 leg "all tests"
 build_in "$root/build-test" -DCMAKE_BUILD_TYPE=Release -DHOLDFAST_WERROR=$werror
 ctest --test-dir "$root/build-test" --output-on-failure --parallel 2 "$@"
