@@ -1,5 +1,8 @@
-# The node for ROS, where that is installed: a file of tests at a time, each with a master
-# of its own.
+# The core of the node for ROS everywhere; the node where ROS is installed, a file of tests
+# at a time, each with a master of its own.
+if(TARGET test_ros_core)
+  target_link_libraries(test_ros_core PRIVATE holdfast_ros_core)
+endif()
 if(NOT HOLDFAST_WITH_ROS OR NOT TARGET holdfast_node)
   return()
 endif()

@@ -20,7 +20,7 @@ leg() {
   printf '\n==== %s (after %d s)\n' "$1" "$SECONDS"
 }
 
-install_packages build python test
+install_packages build python test ros
 leg "all tests"
 # Sixteen sources at a time, which takes half as long: most of it goes into the headers
 # that they share. That each compiles by itself shows below, and under clang.

@@ -20,6 +20,9 @@ same() {
 
 same CITATION.cff "$(sed -n 's/^version: //p' CITATION.cff)"
 same debian/changelog "$(sed -n '1s/^holdfast (\(.*\)) .*/\1/p' debian/changelog)"
+for file in package.xml apps/ros/msgs/holdfast_msgs/package.xml; do
+  same "$file" "$(sed -n 's/^  <version>\(.*\)<\/version>$/\1/p' "$file")"
+done
 # The section below that of what is not released.
 released=$(grep -m 1 '^## [0-9]' CHANGELOG.md || true)
 same CHANGELOG.md "$(sed 's/^## \([^ ]*\) .*/\1/' <<<"$released")"
