@@ -5,6 +5,7 @@
 #include "support/random.h"
 
 #include <holdfast/pcl/frame_extraction.h>
+#include <holdfast/pcl/frame_mapping.h>
 #include <holdfast/pcl/patch_estimation.h>
 
 #include <utility>
@@ -94,6 +95,31 @@ TEST_F(ExtractionAllocation, APatchOfTheFeatureTakesNoneFromTheSecondCloudOn)
   estimation.compute(patches);
   EXPECT_LT(test::allocations - before, kPerCall);
   EXPECT_EQ(patches.size(), size);
+}
+
+TEST_F(ExtractionAllocation, APatchOfAMapTakesNoneFromTheSecondFrameOn)
+{
+  Random random;
+  MappingOptions options;
+  options.extraction.sampler.spacing_m = 0.02;
+  FrameMapper still(makeSensor(kCamera), options),
+      unknown(makeSensor(kCamera), options);
+  FrameReport of_still, of_unknown;
+  for (int frame = 0; frame < 4; ++frame) {
+    const RangeCloud cloud = rollingCloud(random);
+    long before = test::allocations;
+    of_still = still.addStill(cloud, std::move(of_still));
+    const long by_still = test::allocations - before;
+    before = test::allocations;
+    of_unknown = unknown.addUnknown(cloud, std::move(of_unknown));
+    const long by_unknown = test::allocations - before;
+    ASSERT_GT(of_still.measurements, 3 * kPerCall);
+    ASSERT_GT(of_unknown.measurements, 3 * kPerCall);
+    if (frame > 0) {
+      EXPECT_LT(by_still, kPerCall);
+      EXPECT_LT(by_unknown, kPerCall);
+    }
+  }
 }
 
 /// The former result gives its memory, nothing else.

@@ -1,9 +1,11 @@
 // From frames of a moving camera to a map, against the simulated truth; and the map's
 // file.
+#include "support/chi_square_bounds.h"
 #include "support/organized_cloud.h"
 #include "support/run_program.h"
 #include "support/spot.h"
 
+#include <holdfast/geometry/rotation.h>
 #include <holdfast/io/patch_map_file.h>
 #include <holdfast/pcl/conversions.h>
 #include <holdfast/pcl/frame_mapping.h>
@@ -184,6 +186,59 @@ TEST(FrameMapper, FindsItsPoses)
   const double drift = (mapper.map().pose().c - truth.c).norm();
   std::printf("  drift %.2f mm over %.2f m\n", 1e3 * drift, way);
   EXPECT_LT(drift, 0.02 * way);
+}
+
+/// NEES of the pose of a second frame, by a mapper that nobody tells the motion of up
+/// to several centimetres and some tens of milliradians.
+double
+neesOfRandomMotion(const Scene& scene, const Pose& first, Random& random)
+{
+  const Sensor sensor = test::makeSensor(test::makeCamera(240, 180, 217.0));
+  const Pose motion{expMap(0.02 * random.normalVector()), 0.03 * random.normalVector()};
+  const FrameSimulator simulator(scene,
+                                 pixelRays(sensor.camera),
+                                 sensor,
+                                 SimulationOptions(),
+                                 PatternOverTime::Fixed,
+                                 random.seed());
+  FrameMapper mapper(sensor);
+  mapper.addUnknown(cloudOf(simulator.frame(0, first)));
+  const FrameReport report =
+      mapper.addUnknown(cloudOf(simulator.frame(1, first * motion)));
+  const RegistrationResult& result = *report.registration;
+  EXPECT_EQ(result.status, RegistrationStatus::Converged);
+  EXPECT_EQ(result.null_space.cols(), 0);
+  JetVector error;
+  error << logMap(motion.R.transpose() * result.pose.R), result.pose.c - motion.c;
+  return error.dot(result.covariance.inverse() * error);
+}
+
+// Patches a radius apart share most of their points, which are not to count twice.
+TEST(FrameMapper, KnowsHowWellItFindsRandomMotions)
+{
+  constexpr int kTrials = 10;
+  const Scene boulders = makeScene("boulder_field"), rocks = makeScene("rocks");
+  const std::vector<Pose> along = walk(boulders, 80), around = circle(rocks, 40);
+  const double largest = test::largestOf(2 * kTrials);
+  double sum = 0.0;
+  for (std::uint64_t trial = 0; trial < 2 * kTrials; ++trial) {
+    Random random(trial);
+    const bool walks = trial < kTrials;
+    const std::vector<Pose>& poses = walks ? along : around;
+    const Pose& first = poses[static_cast<std::size_t>(
+        random.integer(0, static_cast<int>(poses.size()) - 1))];
+    const double nees = neesOfRandomMotion(walks ? boulders : rocks, first, random);
+    EXPECT_LT(nees, largest);
+    sum += nees;
+  }
+  constexpr int kDegrees = 2 * kTrials * 6;
+  const test::NeesBounds bounds(kDegrees);
+  std::printf("  NEES/dof %.3f, in %.2f to %.2f\n",
+              sum / kDegrees,
+              bounds.lowest,
+              bounds.highest);
+  EXPECT_GT(sum / kDegrees, bounds.lowest);
+  EXPECT_LT(sum / kDegrees, bounds.highest);
 }
 
 TEST(FrameMapper, DoesNotDependOnThreads)

@@ -174,7 +174,9 @@ LiveSession::extract(const RangeCloud& cloud)
 {
   if (!mapper_)
     return extractor_.extract(cloud, std::move(report_.result));
-  FrameReport report = mapper_->addUnknown(cloud);
+  FrameReport former;
+  former.extraction = std::move(report_.result);
+  FrameReport report = mapper_->addUnknown(cloud, std::move(former));
   if (report.registration &&
       report.registration->status != RegistrationStatus::Converged)
     ++lost_frames_;

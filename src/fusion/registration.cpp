@@ -187,10 +187,12 @@ sharersAmong(const std::vector<Measurement>& measurements,
   for (const PatternReach& wave : waves)
     longest = std::max(longest, wave.length);
   std::vector<Eigen::Vector2d> directions;
+  directions.reserve(measurements.size());
   for (const Measurement& m : measurements)
     directions.push_back(direction(m));
   constexpr int kSteps = 64; // of a table: there are a million pairs in a frame
   std::vector<JetVector> sharers;
+  sharers.reserve(measurements.size());
   for (const Measurement& m : measurements) {
     // A disc is as wide as a Gaussian of half its radius.
     const double support = 0.5 * m.radius_m / m.anchor.c.z();
@@ -262,6 +264,7 @@ matchesAt(const std::vector<Measurement>& measurements,
           double reach_m)
 {
   std::vector<Match> matches;
+  matches.reserve(measurements.size());
   for (std::size_t i = 0; i < measurements.size(); ++i)
     if (const MapPatch* patch = map.nearest(measurements[i], sensor, reach_m))
       matches.push_back(
@@ -274,6 +277,7 @@ pairsOf(const std::vector<Match>& matches, const PatchMap& map, const Pose& sens
 {
   const double share = curvedShare(matches);
   std::vector<Pair> pairs;
+  pairs.reserve(matches.size());
   for (const Match& match : matches)
     if (const auto pair = pairAt(match, map, sensor, share))
       pairs.push_back(*pair);
@@ -593,6 +597,7 @@ registerPatches(const std::vector<Measurement>& measurements,
   // Others could only come in after leaps farther than the guess may be off.
   const double reach = options.first_reach * map.options().radius_m;
   std::vector<Measurement> near;
+  near.reserve(measurements.size());
   for (const Measurement& m : measurements)
     if (map.nearest(m, guess, reach))
       near.push_back(m);

@@ -6,6 +6,7 @@
 #include <Eigen/Cholesky>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <mutex>
 #include <stdexcept>
@@ -15,12 +16,15 @@ namespace holdfast {
 
 namespace {
 
+using Clock = std::chrono::steady_clock;
+
 ExtractionOptions
-extractionFor(const MappingOptions& options)
+extractionFor(const MappingOptions& options, const Sensor& sensor)
 {
   ExtractionOptions extraction = options.extraction;
   extraction.fit.surface = SurfaceRequest::Paraboloid;
-  extraction.fit.separate_pattern = true;
+  // Where there is none all is white, which takes no memory beside it to say.
+  extraction.fit.separate_pattern = !sensor.pattern.empty();
   extraction.sampler.radius_m = options.map.radius_m;
   return extraction;
 }
@@ -109,6 +113,33 @@ mapOfPoints(const RangeCloud& cloud,
   return map;
 }
 
+bool
+isFound(const RegistrationResult& result)
+{
+  return result.status == RegistrationStatus::Converged;
+}
+
+/// What of a limit of time (0: none) is left for a second look; nothing: too little.
+std::optional<double>
+timeLeft(double limit_s, Clock::time_point start)
+{
+  constexpr double kLeast = 0.5; // of the limit: what the first look may have taken
+  const double left =
+      limit_s - std::chrono::duration<double>(Clock::now() - start).count();
+  if (limit_s > 0.0 && left < kLeast * limit_s)
+    return std::nullopt;
+  return limit_s > 0.0 ? left : 0.0;
+}
+
+/// An empty report.
+FrameReport
+withMemoryOf(FrameReport former)
+{
+  FrameReport report;
+  report.extraction = std::move(former.extraction);
+  return report;
+}
+
 /// The motion that goes on like this one, for so many times as long.
 Pose
 power(const Pose& motion, double times)
@@ -145,12 +176,6 @@ mappingOptionsFor(const Sensor& sensor, const ExtractionOptions& extraction)
   return options;
 }
 
-/// What a frame says.
-struct FrameMapper::Measured {
-  std::vector<Measurement> measurements;
-  std::vector<std::uint64_t> seen_through;
-};
-
 FrameMapper::FrameMapper(const Sensor& sensor, const MappingOptions& options)
 : FrameMapper(sensor, options, PatchMap(options.map))
 {}
@@ -163,7 +188,7 @@ FrameMapper::FrameMapper(const Sensor& sensor,
   if (!(options.motion_sigma_rad > 0.0 && options.motion_sigma_m > 0.0))
     throw std::invalid_argument("the sigmas of a motion must be positive");
   options_.map = map_.options();
-  options_.extraction = extractionFor(options_);
+  options_.extraction = extractionFor(options_, sensor_);
 }
 
 /// Where the map wants a frame to be measured.
@@ -184,6 +209,7 @@ FrameMapper::Places
 FrameMapper::placesIn(const RangeCloud& frame, const Pose& sensor, FrameReport& report)
 {
   Places places;
+  report.hidden = report.asked = 0;
   // A frame that does not tell its camera has next to no point.
   if (!hasSizeOf(frame, matched_->camera))
     return places;
@@ -216,8 +242,12 @@ FrameMapper::placesIn(const RangeCloud& frame, const Pose& sensor, FrameReport& 
   return places;
 }
 
-FrameMapper::Measured
-FrameMapper::measure(const RangeCloud& frame, const Pose& sensor, FrameReport& report)
+/// \param sensor its pose, as far as it is known.
+void
+FrameMapper::measure(const RangeCloud& frame,
+                     const Pose& sensor,
+                     double max_time_s,
+                     FrameReport& report)
 {
   if (const std::string error = validityError(frame); !error.empty())
     throw std::invalid_argument(error);
@@ -228,11 +258,11 @@ FrameMapper::measure(const RangeCloud& frame, const Pose& sensor, FrameReport& r
   const double nearest =
       std::min(kFree * options_.extraction.sampler.spacing_m, options_.map.radius_m);
   const Pose to_map = sensor * frame.sensor_pose.inverse();
-  const Places places = placesIn(frame, sensor, report);
-  Measured measured;
-  measured.seen_through = places.seen_through;
+  Places places = placesIn(frame, sensor, report);
+  measured_.seen_through = std::move(places.seen_through);
+  measured_.measurements.clear();
   PatchSites sites;
-  sites.first_seeds = places.seeds;
+  sites.first_seeds = std::move(places.seeds);
   sites.is_free = [&](const Seed& seed) {
     return !map_.hasAnchorWithin(to_map.toWorld(seed.position), nearest);
   };
@@ -245,82 +275,109 @@ FrameMapper::measure(const RangeCloud& frame, const Pose& sensor, FrameReport& r
         m->id = attempt + 1;
         m->asked_by = attempt < places.asking.size() ? places.asking[attempt] : 0;
         const std::lock_guard<std::mutex> lock(mutex);
-        measured.measurements.push_back(*m);
+        measured_.measurements.push_back(*m);
       };
-  report.extraction = extractPatches(frame, *matched_, options_.extraction, sites);
+  ExtractionOptions extraction = options_.extraction;
+  extraction.sampler.max_time_s = max_time_s;
+  report.extraction =
+      extractPatches(frame, *matched_, extraction, sites, std::move(report.extraction));
   // In whatever order the threads came to an end with them.
-  std::sort(measured.measurements.begin(),
-            measured.measurements.end(),
+  std::sort(measured_.measurements.begin(),
+            measured_.measurements.end(),
             [](const Measurement& a, const Measurement& b) { return a.id < b.id; });
-  report.measurements = static_cast<int>(measured.measurements.size());
-  return measured;
-}
-
-void
-FrameMapper::update(const Measured& measured, FrameReport& report)
-{
-  report.update = map_.update(measured.measurements, measured.seen_through);
+  report.measurements = static_cast<int>(measured_.measurements.size());
 }
 
 FrameReport
-FrameMapper::add(const RangeCloud& frame, const Motion& motion)
+FrameMapper::addFrom(const RangeCloud& frame, FrameReport former)
 {
-  FrameReport report;
+  FrameReport report = withMemoryOf(std::move(former));
+  measure(frame, map_.pose(), options_.extraction.sampler.max_time_s, report);
+  report.update = map_.update(measured_.measurements, measured_.seen_through);
+  return report;
+}
+
+FrameReport
+FrameMapper::add(const RangeCloud& frame, const Motion& motion, FrameReport former)
+{
   map_.move(motion.increment, motion.covariance);
-  update(measure(frame, map_.pose(), report), report);
-  return report;
+  return addFrom(frame, std::move(former));
 }
 
 FrameReport
-FrameMapper::addStill(const RangeCloud& frame)
+FrameMapper::addStill(const RangeCloud& frame, FrameReport former)
 {
-  FrameReport report;
-  update(measure(frame, map_.pose(), report), report);
-  return report;
+  return addFrom(frame, std::move(former));
 }
 
 FrameReport
-FrameMapper::addUnknown(const RangeCloud& frame)
+FrameMapper::addUnknown(const RangeCloud& frame, FrameReport former)
 {
-  FrameReport report;
+  if (map_.patches().empty())
+    return addFrom(frame, std::move(former));
+  const auto start = Clock::now();
+  FrameReport report = withMemoryOf(std::move(former));
+  const double limit = options_.extraction.sampler.max_time_s;
   const Pose guess = map_.pose() * power(step_, 1 + frames_missed_);
-  const Measured measured = measure(frame, guess, report);
-  if (map_.patches().empty() || moveByRegistration(measured, guess, report))
-    update(measured, report);
-  return report;
-}
-
-bool
-FrameMapper::moveByRegistration(const Measured& measured,
-                                const Pose& guess,
-                                FrameReport& report)
-{
-  const Pose before = map_.pose();
-  const auto registered = [&](const Pose& from) {
-    return registerPatches(measured.measurements, map_, from, options_.registration);
-  };
+  measure(frame, guess, limit, report);
   RegistrationResult result = registered(guess);
-  // Who has stopped is where he was.
-  if (result.status != RegistrationStatus::Converged)
-    if (RegistrationResult still = registered(before);
-        still.status == RegistrationStatus::Converged)
-      result = std::move(still);
-  const bool is_found = result.status == RegistrationStatus::Converged;
-  if (is_found) {
-    // To the axes of the frame before, which increments are in.
-    JetMatrix T = JetMatrix::Identity();
-    T.bottomRightCorner<3, 3>() = before.R.transpose();
-    const Pose increment = before.inverse() * result.pose;
-    map_.move(increment,
-              T * poseCovariance(result, priorCovariance(options_)) * T.transpose());
-    step_ = power(increment, 1.0 / (1 + frames_missed_));
-    frames_missed_ = 0;
+  if (isFound(result) && isFarOff(guess, result.pose))
+    if (const auto left = timeLeft(limit, start)) {
+      measure(frame, result.pose, *left, report);
+      result = registered(result.pose);
+    }
+  if (isFound(result)) {
+    moveTo(result);
+    report.update = map_.update(measured_.measurements, measured_.seen_through);
   }
   else {
     ++frames_missed_;
   }
   report.registration = std::move(result);
-  return is_found;
+  return report;
+}
+
+RegistrationResult
+FrameMapper::registered(const Pose& guess) const
+{
+  const auto from = [this](const Pose& pose) {
+    return registerPatches(measured_.measurements, map_, pose, options_.registration);
+  };
+  RegistrationResult result = from(guess);
+  // Who has stopped is where he was.
+  if (!isFound(result))
+    if (RegistrationResult still = from(map_.pose()); isFound(still))
+      result = std::move(still);
+  return result;
+}
+
+/// True where supports were not those of the patches that asked for them: as far off as
+/// the model's error is known to describe, or further.
+bool
+FrameMapper::isFarOff(const Pose& guess, const Pose& found) const
+{
+  constexpr double kNear = 0.2; // of the radius
+  const double most = kNear * options_.map.radius_m;
+  return std::any_of(measured_.measurements.begin(),
+                     measured_.measurements.end(),
+                     [&](const Measurement& m) {
+                       const Eigen::Vector3d& c = m.anchor.c;
+                       return (guess.toWorld(c) - found.toWorld(c)).norm() > most;
+                     });
+}
+
+void
+FrameMapper::moveTo(const RegistrationResult& result)
+{
+  const Pose before = map_.pose();
+  // To the axes of the frame before, which increments are in.
+  JetMatrix T = JetMatrix::Identity();
+  T.bottomRightCorner<3, 3>() = before.R.transpose();
+  const Pose increment = before.inverse() * result.pose;
+  map_.move(increment,
+            T * poseCovariance(result, priorCovariance(options_)) * T.transpose());
+  step_ = power(increment, 1.0 / (1 + frames_missed_));
+  frames_missed_ = 0;
 }
 
 PatchMap

@@ -23,8 +23,9 @@ bool isStill(const Pose& increment);
 
 struct MappingOptions {
   PatchMapOptions map;
-  /// Seeds, neighbourhoods, acceptance. The fits are of paraboloids with the pattern
-  /// apart whatever is said here, and the radius is the map's.
+  /// Seeds, neighbourhoods, acceptance. The fits are of paraboloids, with the pattern
+  /// apart where the sensor has one, whatever is said here, and the radius is the
+  /// map's.
   ExtractionOptions extraction;
   RegistrationOptions registration;
   /// What is known of a motion that nobody tells, before the patches are asked: rad and
@@ -57,17 +58,24 @@ public:
   /// \param frame organized, its sensor pose where the sensor is in its own points.
   /// \throw std::invalid_argument when the frame is not organized, or the covariance
   /// of the motion is none (PatchMap::move()).
-  FrameReport add(const RangeCloud& frame, const Motion& motion);
+  /// \param former a report that is done with: the memory of its patches is used again,
+  ///        so that from the second frame of a size on patches take none but for what
+  ///        the map bears and, where the sensor has a pattern, their part of it.
+  FrameReport add(const RangeCloud& frame,
+                  const Motion& motion,
+                  FrameReport former = {});
 
   /// The same from a sensor that has not moved.
-  FrameReport addStill(const RangeCloud& frame);
+  FrameReport addStill(const RangeCloud& frame, FrameReport former = {});
 
   /// The same from a sensor of which nobody knows how it has moved: registerPatches()
   /// finds it, from where the last motion goes on. What that leaves open is as
   /// uncertain as MappingOptions says. Where it fails (FrameReport::registration) the
   /// map stays as it is, and the next frame is looked for where that motion, gone on
-  /// for longer, leads.
-  FrameReport addUnknown(const RangeCloud& frame);
+  /// for longer, leads. Where the motion was another one, so that supports were not
+  /// those of the map's patches, the frame is measured again from the pose found, if
+  /// the sampler's limit of time leaves enough.
+  FrameReport addUnknown(const RangeCloud& frame, FrameReport former = {});
 
   const PatchMap& map() const
   {
@@ -75,20 +83,30 @@ public:
   }
 
 private:
-  struct Measured;
   struct Places;
+
   void matchSensor(const RangeCloud& frame);
   Places placesIn(const RangeCloud& frame, const Pose& sensor, FrameReport& report);
-  Measured measure(const RangeCloud& frame, const Pose& sensor, FrameReport& report);
-  void update(const Measured& measured, FrameReport& report);
-  bool moveByRegistration(const Measured& measured,
-                          const Pose& guess,
-                          FrameReport& report);
+  void measure(const RangeCloud& frame,
+               const Pose& sensor,
+               double max_time_s,
+               FrameReport& report);
+  FrameReport addFrom(const RangeCloud& frame, FrameReport former);
+  RegistrationResult registered(const Pose& guess) const;
+  bool isFarOff(const Pose& guess, const Pose& found) const;
+  void moveTo(const RegistrationResult& result);
+
+  /// What a frame says.
+  struct Measured {
+    std::vector<Measurement> measurements;
+    std::vector<std::uint64_t> seen_through;
+  };
 
   Sensor sensor_;
   std::optional<Sensor> matched_; ///< with the camera on whose pixels the frames lie
   MappingOptions options_;
   PatchMap map_;
+  Measured measured_;
   Pose step_; ///< from frame to frame, of the last motion that was found
   int frames_missed_ = 0; ///< since
 };
