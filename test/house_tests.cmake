@@ -15,6 +15,14 @@ add_test(NAME include_direction_finds_violations
 set_tests_properties(include_direction_finds_violations PROPERTIES PASS_REGULAR_EXPRESSION
   "fit must not include sensor.*must not include <pcl|must not include <pcl.*fit must not include sensor")
 
+add_test(NAME one_definition COMMAND ${support}/check_one_definition.py ${PROJECT_SOURCE_DIR})
+file(WRITE ${bad_tree}/src/fit/placed.h "namespace holdfast {\nstruct Placed {\n};\n} // namespace holdfast\n")
+file(WRITE ${bad_tree}/apps/placed.cpp "namespace holdfast {\nclass Placed : Base {\n};\n} // namespace holdfast\n")
+add_test(NAME one_definition_finds_violations
+  COMMAND ${support}/check_one_definition.py ${bad_tree})
+set_tests_properties(one_definition_finds_violations PROPERTIES
+  PASS_REGULAR_EXPRESSION "holdfast::Placed is defined in src/fit/placed.h and apps/placed.cpp|holdfast::Placed is defined in apps/placed.cpp and src/fit/placed.h")
+
 # Every public header compiles alone, those of the core where PCL is not installed.
 get_target_property(core_dirs Eigen3::Eigen INTERFACE_INCLUDE_DIRECTORIES)
 set(header_dirs ${PROJECT_SOURCE_DIR}/include ${PROJECT_BINARY_DIR}/include)

@@ -38,7 +38,7 @@ for name in "${tests[@]}"; do
   [[ -e $root/test/test_$name.cpp ]] && existing+=("$name")
 done
 targets=()
-chosen=(-E "^(format|include_direction|headers_compile_alone|package_setup|readme|links|versions)")
+chosen=(-E "^(format|include_direction|one_definition|headers_compile_alone|package_setup|readme|links|versions)")
 if ((${#existing[@]})); then
   targets=(-- "${existing[@]/#/test_}")
   chosen=(-R "^($(IFS="|" && echo "${existing[*]}"))\$")

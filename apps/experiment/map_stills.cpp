@@ -21,12 +21,12 @@ constexpr double kLeastInside = 0.98; // of a disc's pixels
 
 /// The frames of one pose and their plane p . q = 1, camera frame, p in 1/m.
 struct Stills {
-  std::vector<const Recording*> frames;
+  std::vector<const RecordedCloud*> frames;
   Eigen::Vector3d plane = Eigen::Vector3d::Zero();
 };
 
 Eigen::Vector3d
-planeOf(const Recording& recording)
+planeOf(const RecordedCloud& recording)
 {
   const Pose& pose = recording.cloud.sensor_pose;
   const Eigen::Vector3d normal = pose.R.transpose() * recording.plane.normal;
@@ -35,7 +35,7 @@ planeOf(const Recording& recording)
 
 /// Of the poses that have several frames.
 std::vector<Stills>
-stillsAmong(const std::vector<Recording>& recordings)
+stillsAmong(const std::vector<RecordedCloud>& recordings)
 {
   const std::vector<int> poses = posesOf(recordings);
   std::vector<Stills> all(
@@ -52,14 +52,14 @@ stillsAmong(const std::vector<Recording>& recordings)
         recordings.front().name +
         ": no two recordings of one pose, to map what stood still");
   for (Stills& stills : all)
-    for (const Recording* frame : stills.frames)
+    for (const RecordedCloud* frame : stills.frames)
       stills.plane += planeOf(*frame) / static_cast<double>(stills.frames.size());
   return all;
 }
 
 /// Whether the disc of a patch is on the plane of a frame.
 bool
-isOnPlane(const MapPatch& patch, const Recording& frame)
+isOnPlane(const MapPatch& patch, const RecordedCloud& frame)
 {
   const Camera& camera = frame.sensor.camera;
   const double radius = patch.radius_m;
@@ -159,7 +159,7 @@ mapStills(const RecordingOptions& options,
           std::uint64_t seed,
           std::vector<std::string>& remarks)
 {
-  std::vector<Recording> recordings = loadRecordings(options, seed, remarks);
+  std::vector<RecordedCloud> recordings = loadRecordings(options, seed, remarks);
   usePatternsOfOtherPoses(recordings, remarks);
   const std::vector<Stills> all = stillsAmong(recordings);
   std::vector<std::vector<StillOutcome>> outcomes;

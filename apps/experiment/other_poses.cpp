@@ -16,20 +16,20 @@ namespace {
 constexpr int kStep = 8; // px between the pixels compared
 
 int
-widthOf(const Recording& recording)
+widthOf(const RecordedCloud& recording)
 {
   return static_cast<int>(recording.cloud.points->width);
 }
 
 int
-heightOf(const Recording& recording)
+heightOf(const RecordedCloud& recording)
 {
   return static_cast<int>(recording.cloud.points->height);
 }
 
 /// 1/z of the plane along the ray of a pixel, camera frame, 1/m.
 double
-inverseDepth(const Recording& recording, const Eigen::Vector3d& ray)
+inverseDepth(const RecordedCloud& recording, const Eigen::Vector3d& ray)
 {
   const RecordedPlane& plane = recording.plane;
   const Pose& pose = recording.cloud.sensor_pose;
@@ -37,7 +37,7 @@ inverseDepth(const Recording& recording, const Eigen::Vector3d& ray)
 }
 
 bool
-isSamePose(const Recording& a, const Recording& b)
+isSamePose(const RecordedCloud& a, const RecordedCloud& b)
 {
   if (widthOf(a) != widthOf(b) || heightOf(a) != heightOf(b))
     return false;
@@ -62,7 +62,7 @@ isSamePose(const Recording& a, const Recording& b)
 NoisePattern
 patternWithout(int pose,
                const std::vector<int>& poses,
-               const std::vector<Recording>& recordings)
+               const std::vector<RecordedCloud>& recordings)
 {
   std::vector<PoseFrames> frames;
   for (int other = 0; other <= *std::max_element(poses.begin(), poses.end()); ++other) {
@@ -90,9 +90,9 @@ patternWithout(int pose,
 }
 
 void
-requireOneSize(const std::vector<Recording>& recordings)
+requireOneSize(const std::vector<RecordedCloud>& recordings)
 {
-  for (const Recording& recording : recordings)
+  for (const RecordedCloud& recording : recordings)
     if (widthOf(recording) != widthOf(recordings.front()) ||
         heightOf(recording) != heightOf(recordings.front()))
       throw std::runtime_error(recording.name + ": not of the size of " +
@@ -103,11 +103,11 @@ requireOneSize(const std::vector<Recording>& recordings)
 } // namespace
 
 std::vector<int>
-posesOf(const std::vector<Recording>& recordings)
+posesOf(const std::vector<RecordedCloud>& recordings)
 {
   std::vector<int> poses;
   int count = 0;
-  for (const Recording& recording : recordings) {
+  for (const RecordedCloud& recording : recordings) {
     int pose = count;
     for (std::size_t i = 0; i < poses.size() && pose == count; ++i)
       if (isSamePose(recordings[i], recording))
@@ -119,7 +119,7 @@ posesOf(const std::vector<Recording>& recordings)
 }
 
 void
-usePatternsOfOtherPoses(std::vector<Recording>& recordings,
+usePatternsOfOtherPoses(std::vector<RecordedCloud>& recordings,
                         std::vector<std::string>& remarks)
 {
   requireOneSize(recordings);

@@ -39,7 +39,7 @@ using Disc = std::vector<int>; ///< indices into the cloud
 /// Every stride-th pixel about one that is inside the plane; empty where the disc
 /// reaches beyond it.
 Disc
-discAt(const Recording& recording, const DiscSize& size, int column, int row)
+discAt(const RecordedCloud& recording, const DiscSize& size, int column, int row)
 {
   const int width = static_cast<int>(recording.cloud.points->width);
   const int height = static_cast<int>(recording.cloud.points->height);
@@ -63,7 +63,7 @@ discAt(const Recording& recording, const DiscSize& size, int column, int row)
 /// Discs about a grid half overlap, so that no place counts for more than others; where
 /// that are more than wanted, a random choice of them.
 std::vector<Disc>
-discsOn(const Recording& recording,
+discsOn(const RecordedCloud& recording,
         const DiscSize& size,
         int most,
         std::mt19937_64 generator)
@@ -128,7 +128,7 @@ compare(const FitResult& fit, const RecordedPlane& plane, Outcome& outcome)
 /// Fits of discs with one sensor's noise. Refers to the recording.
 class DiscFitter {
 public:
-  DiscFitter(const Recording& recording, const Sensor& sensor)
+  DiscFitter(const RecordedCloud& recording, const Sensor& sensor)
   : recording_(recording)
   , gatherer_(recording.cloud, sensor, planeOptions().noise_at_surface)
   , plane_(planeOptions())
@@ -171,7 +171,7 @@ private:
     return estimator.estimate(batch);
   }
 
-  const Recording& recording_;
+  const RecordedCloud& recording_;
   PointGatherer gatherer_;
   PatchEstimator plane_;
   PatchEstimator auto_;
@@ -258,7 +258,7 @@ using Outcomes = std::array<Outcome, 2>; ///< without the pattern, with it
 
 /// Of the discs of one size on one recording.
 std::vector<Outcomes>
-fitDiscs(const Recording& recording,
+fitDiscs(const RecordedCloud& recording,
          std::size_t size,
          std::uint64_t stream,
          const ExperimentSettings& settings)
@@ -366,7 +366,7 @@ run(const ExperimentSettings& settings, const RealOptions& options)
   Report report;
   report.columns = columns();
   report.remarks = explanations();
-  std::vector<Recording> recordings =
+  std::vector<RecordedCloud> recordings =
       loadRecordings(options.recordings, settings.seed, report.remarks);
   if (options.leave_one_out)
     usePatternsOfOtherPoses(recordings, report.remarks);
@@ -376,7 +376,7 @@ run(const ExperimentSettings& settings, const RealOptions& options)
   const int total = static_cast<int>(recordings.size() * kSizes.size());
   Tallies all;
   int done = 0;
-  for (const Recording& recording : recordings) {
+  for (const RecordedCloud& recording : recordings) {
     Tallies own;
     for (std::size_t size = 0; size < kSizes.size(); ++size) {
       const auto stream = static_cast<std::uint64_t>(done);

@@ -57,7 +57,7 @@ pathsOf(const RecordingOptions& options)
 }
 
 std::string
-planeRemark(const Recording& recording)
+planeRemark(const RecordedCloud& recording)
 {
   const RecordedPlane& plane = recording.plane;
   return fmt::format("{}: plane of {} pixels, at {:.2f} m; rms about it {:.2f} sigmas "
@@ -69,7 +69,7 @@ planeRemark(const Recording& recording)
 }
 
 /// Nothing where there is no plane, which a remark says then.
-std::optional<Recording>
+std::optional<RecordedCloud>
 loadRecording(const std::string& path,
               const Sensor& nominal,
               std::uint64_t seed,
@@ -77,7 +77,7 @@ loadRecording(const std::string& path,
 {
   InputOptions input;
   CloudFileInfo info;
-  Recording recording;
+  RecordedCloud recording;
   recording.name = fs::path(path).stem().string();
   recording.cloud = loadCloud(path, loadOptions(input, nominal), &info);
   if (recording.cloud.points->height < 2)
@@ -123,13 +123,13 @@ addRecordingOptions(CLI::App& command, RecordingOptions& options)
   addSensorOption(command, options.sensor_name);
 }
 
-std::vector<Recording>
+std::vector<RecordedCloud>
 loadRecordings(const RecordingOptions& options,
                std::uint64_t seed,
                std::vector<std::string>& remarks)
 {
   const Sensor nominal = loadSensorOption(options.sensor_name);
-  std::vector<Recording> recordings;
+  std::vector<RecordedCloud> recordings;
   for (const std::string& path : pathsOf(options))
     if (auto recording = loadRecording(path, nominal, seed, remarks))
       recordings.push_back(std::move(*recording));

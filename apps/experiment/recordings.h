@@ -20,7 +20,7 @@ struct RecordingOptions {
 /// Adds --clouds, --data and --sensor. `options` must outlive the parsing.
 void addRecordingOptions(CLI::App& command, RecordingOptions& options);
 
-struct Recording {
+struct RecordedCloud {
   std::string name; ///< of the file
   Sensor sensor; ///< with the camera of the cloud
   RangeCloud cloud;
@@ -31,8 +31,8 @@ struct Recording {
 /// \param remarks is told what the reader decided, what was left out, and the planes.
 /// \throw std::runtime_error when there is none, or one cannot be read or has no
 ///        pixels; CLI::ValidationError when nothing says where they are.
-std::vector<Recording> loadRecordings(const RecordingOptions& options,
-                                      std::uint64_t seed,
-                                      std::vector<std::string>& remarks);
+std::vector<RecordedCloud> loadRecordings(const RecordingOptions& options,
+                                          std::uint64_t seed,
+                                          std::vector<std::string>& remarks);
 
 } // namespace holdfast::app
