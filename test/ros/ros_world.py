@@ -47,6 +47,11 @@ def environment(folder, port):
     return result
 
 
+def hear_hangups():
+    """In a child: that these tests run under nohup is none of its business."""
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
 class Process:
     """A process in a session of its own, what it says in a file."""
 
@@ -55,7 +60,8 @@ class Process:
         with open(self.log, "wb") as out:
             self.popen = subprocess.Popen(
                 [str(word) for word in command], env=env, stdin=subprocess.DEVNULL,
-                stdout=out, stderr=subprocess.STDOUT, start_new_session=True)
+                stdout=out, stderr=subprocess.STDOUT, start_new_session=True,
+                preexec_fn=hear_hangups)
 
     def text(self):
         return self.log.read_text(errors="replace")

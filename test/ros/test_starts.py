@@ -73,6 +73,7 @@ class Terminal:
             out = os.open(self.log, os.O_CREAT | os.O_TRUNC | os.O_WRONLY, 0o644)
             os.dup2(out, 1)
             os.dup2(out, 2)
+            ros_world.hear_hangups()
             os.execvpe(str(command[0]), [str(word) for word in command], env)
 
     def close(self):

@@ -55,6 +55,7 @@ Node::Node()
 Node::~Node()
 {
   queue_.close();
+  transforms_.stop();
   worker_.join();
 }
 
@@ -142,7 +143,7 @@ Node::work()
 {
   while (const std::optional<Received> received = queue_.take()) {
     const Answer answer = session_.answer(toFrame(*received));
-    if (!ros::ok())
+    if (transforms_.isStopped())
       return; // what was waited for was given up
     if (answer.time_jumped)
       transforms_.clear();

@@ -2,8 +2,6 @@
 
 #include "ros1/conversions.h"
 
-#include <ros/init.h>
-
 #include <thread>
 
 namespace holdfast::robot {
@@ -25,7 +23,7 @@ Transforms::find(const std::string& target,
   const auto end = Clock::now() + timeout_;
   cause.clear();
   while (!buffer_.canTransform(target, source, time, &cause)) {
-    if (Clock::now() >= end || !ros::ok())
+    if (Clock::now() >= end || is_stopped_)
       return std::nullopt;
     cause.clear();
     std::this_thread::sleep_for(std::chrono::milliseconds(2));

@@ -7,6 +7,7 @@
 #include <tf2_ros/transform_broadcaster.h>
 #include <tf2_ros/transform_listener.h>
 
+#include <atomic>
 #include <chrono>
 #include <string>
 
@@ -24,6 +25,16 @@ public:
                            Stamp stamp,
                            std::string& cause) const;
 
+  /// Ends all waiting, for good; from any thread.
+  void stop()
+  {
+    is_stopped_ = true;
+  }
+  bool isStopped() const
+  {
+    return is_stopped_;
+  }
+
   /// Forgets what came before a time jump.
   void clear();
 
@@ -32,6 +43,7 @@ public:
 
 private:
   std::chrono::duration<double> timeout_;
+  std::atomic<bool> is_stopped_{false};
   tf2_ros::Buffer buffer_;
   tf2_ros::TransformListener listener_;
   tf2_ros::TransformBroadcaster broadcaster_;
