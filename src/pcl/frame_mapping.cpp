@@ -108,7 +108,7 @@ mapOfPoints(const RangeCloud& cloud,
         const std::lock_guard<std::mutex> lock(mutex);
         measurements.push_back(*measurement);
       };
-  extraction = extractPatches(cloud, sensor, extractionFor(options), sites);
+  extraction = extractPatches(cloud, sensor, extractionFor(options, sensor), sites);
   map.update(measurements); // in whatever order
   return map;
 }
