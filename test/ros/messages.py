@@ -54,7 +54,8 @@ class Link:
         remapped = [f"{topic}:={full(topic)}" for topic in inputs
                     if not topic.startswith("/")]
         self.name = name
-        self.node = world.start(name, *remapped, *arguments)
+        # What is done in a time depends on the machine and on what else it does.
+        self.node = world.start(name, *remapped, "_budget_ms:=0", *arguments)
         self.publishers = {topic: rospy.Publisher(full(topic), kind, queue_size=1000)
                            for topic, kind in inputs.items()}
         self.answers = {topic: queue.Queue() for topic in outputs}

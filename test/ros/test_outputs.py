@@ -37,7 +37,7 @@ def heights(answer):
 
 
 def test_a_map_is_in_the_frame_of_odometry_and_keeps_its_patches(walk, link):
-    one = link("_map:=true", "_odometry_frame:=odom", "_budget_ms:=0", "_max_patches:=0",
+    one = link("_map:=true", "_odometry_frame:=odom", "_max_patches:=0",
                PATIENT, inputs={**CLOUD, **TF})
     answers = send_walk(one, walk)
     for answer in answers:
@@ -56,8 +56,7 @@ def test_a_map_is_in_the_frame_of_odometry_and_keeps_its_patches(walk, link):
 def test_odometry_that_is_less_sure_makes_a_map_less_sure(walk, link):
     sigmas = []
     for rate in (1e-4, 0.05):
-        one = link("_map:=true", "_odometry_frame:=odom", "_budget_ms:=0",
-                   "_max_patches:=0", PATIENT,
+        one = link("_map:=true", "_odometry_frame:=odom", "_max_patches:=0", PATIENT,
                    inputs={**CLOUD, **TF, "odometry": nav_msgs.msg.Odometry})
         message = nav_msgs.msg.Odometry(child_frame_id="camera")
         message.twist.covariance = (rate ** 2 * np.eye(6)).ravel().tolist()
@@ -71,7 +70,7 @@ def test_odometry_that_is_less_sure_makes_a_map_less_sure(walk, link):
 
 
 def test_a_map_without_odometry_finds_its_poses_and_tells_them(walk, link):
-    one = link("_map:=true", "_budget_ms:=0", "_max_patches:=0",
+    one = link("_map:=true", "_max_patches:=0",
                outputs={**PATCHES, "/tf": tf2_msgs.msg.TFMessage})
     for points, (seconds, *_) in zip(walk[0], walk[2]):
         answer = one.ask(cloud(points, 10.0 + seconds))

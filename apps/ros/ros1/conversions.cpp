@@ -248,6 +248,7 @@ toPatchArray(const Answer& answer)
     message.patches.push_back(patchMessage(patch));
   for (const Complaint& complaint : answer.complaints)
     message.problem += (message.problem.empty() ? "" : "; ") + complaint.text;
+  message.notices = answer.notices;
   message.failed_seeds = static_cast<std::uint32_t>(answer.failed_seeds);
   message.turned_down = static_cast<std::uint32_t>(answer.turned_down);
   message.work_ms = static_cast<float>(answer.work_ms);

@@ -49,8 +49,8 @@ waitForMaster()
   return !is_asked_to_stop;
 }
 
-/// ros::spin(), and an end on this thread. The one that ros::requestShutdown() makes is
-/// on a thread of roscpp, where it may wait for this one, which waits for it.
+/// ros::spin(), with the end on this thread, when nothing uses the node any more; that
+/// of ros::requestShutdown() would be on one of roscpp's.
 void
 spin()
 {

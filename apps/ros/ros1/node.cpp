@@ -3,9 +3,10 @@
 #include "ros1/conversions.h"
 #include "ros1/markers.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <exception>
-#include <utility>
 
 namespace holdfast::robot {
 namespace {
@@ -67,7 +68,7 @@ Node::subscribe()
         "cloud",
         kUnread,
         [this](const sensor_msgs::PointCloud2ConstPtr& message) {
-          receive({message, nullptr, std::nullopt, Clock::now()});
+          queue_.put({message, nullptr, std::nullopt, Clock::now()});
         });
   }
   else {
@@ -81,7 +82,7 @@ Node::subscribe()
         "depth/image",
         kUnread,
         [this](const sensor_msgs::ImageConstPtr& message) {
-          receive({nullptr, message, camera_, Clock::now()});
+          queue_.put({nullptr, message, camera_, Clock::now()});
         });
   }
   if (parameters_.settings.map && !parameters_.settings.odometry_frame.empty())
@@ -105,12 +106,6 @@ Node::toTuning(const ::holdfast::HoldfastConfig& config)
   tuning.max_view_angle_deg = config.max_view_angle;
   tuning.max_curvature_per_m = config.max_curvature;
   return tuning;
-}
-
-void
-Node::receive(Received received)
-{
-  queue_.put(std::move(received));
 }
 
 Frame
@@ -158,8 +153,10 @@ Node::say(const Answer& answer)
   for (const Complaint& complaint : answer.complaints)
     if (const auto line = throttle_.pass(complaint.trouble, complaint.text))
       ROS_WARN("%s", line->c_str());
-  for (const std::string& notice : answer.notices)
-    ROS_INFO_THROTTLE(10.0, "%s", notice.c_str());
+  if (!answer.notices.empty())
+    ROS_INFO_THROTTLE(parameters_.warning_period.count(),
+                      "%s",
+                      fmt::format("{}", fmt::join(answer.notices, "; ")).c_str());
 }
 
 void

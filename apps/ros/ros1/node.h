@@ -53,7 +53,6 @@ private:
   };
 
   void subscribe();
-  void receive(Received received);
   Frame toFrame(const Received& received) const;
   void work();
   void say(const Answer& answer);
