@@ -264,8 +264,7 @@ FrameMapper::measure(const RangeCloud& frame,
   PatchSites sites;
   sites.first_seeds = std::move(places.seeds);
   sites.is_free = [&](const Seed& seed) {
-    const Eigen::Vector3d place = to_map.toWorld(seed.position);
-    return !map_.hasAnchorWithin(place, nearest) && !map_.isCovered(place);
+    return !map_.hasAnchorWithin(to_map.toWorld(seed.position), nearest);
   };
   std::mutex mutex;
   sites.observe =
