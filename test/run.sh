@@ -22,8 +22,8 @@ leg() {
 
 install_packages build python test ros
 leg "all tests"
-# Sixteen sources at a time, which takes half as long: most of it goes into the headers
-# that they share. That each compiles by itself shows below, and under clang.
+# Sixteen sources at a time: most of what they take goes into the headers that they
+# share. That each compiles by itself shows below, and under clang.
 build_in "$root/build-test" -DCMAKE_BUILD_TYPE=Release -DHOLDFAST_WERROR=$werror \
   -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=16
 ctest --test-dir "$root/build-test" --output-on-failure --parallel 2 "$@"

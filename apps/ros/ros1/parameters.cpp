@@ -1,10 +1,12 @@
 #include "ros1/parameters.h"
 
+#include <holdfast/HoldfastConfig.h>
 #include <holdfast/enum_names.h>
 #include <holdfast/fit/names.h>
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 #include <stdexcept>
@@ -16,14 +18,16 @@ namespace {
 
 constexpr EnumNames<CloudAxes, 3> kAxesNames{{"camera", "opengl", "ros"}};
 constexpr EnumNames<Input, 2> kInputNames{{"cloud", "depth"}};
-/// Those of cfg/Holdfast.cfg, which dynamic_reconfigure reads.
-const std::set<std::string> kDynamicNames{"radius",
-                                          "max_patches",
-                                          "budget_ms",
-                                          "max_chi2_per_dof",
-                                          "min_coverage",
-                                          "max_view_angle",
-                                          "max_curvature"};
+
+/// Of cfg/Holdfast.cfg, which dynamic_reconfigure reads.
+bool
+isDynamic(const std::string& name)
+{
+  const auto& parameters = ::holdfast::HoldfastConfig::__getParamDescriptions__();
+  return std::any_of(parameters.begin(), parameters.end(), [&](const auto& parameter) {
+    return parameter->name == name;
+  });
+}
 
 /// Reads parameters and remembers which.
 class Reader {
@@ -67,7 +71,7 @@ public:
     for (const std::string& name : names)
       if (name.rfind(own, 0) == 0) {
         const std::string word = name.substr(own.size());
-        if (known_.count(word) == 0 && kDynamicNames.count(word) == 0)
+        if (known_.count(word) == 0 && !isDynamic(word))
           throw std::runtime_error("there is no parameter " + word);
       }
   }
