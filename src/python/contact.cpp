@@ -159,14 +159,11 @@ const Keywords<FootholdOptions>&
 rankingKeywords()
 {
   static const Keywords<FootholdOptions> keywords = [] {
-    const auto of = [](auto member) {
-      return [member](FootholdOptions& o) -> decltype(auto) { return (o.*member); };
-    };
     using O = FootholdOptions;
     Keywords<FootholdOptions> k("rank_footholds");
-    k.add("yaws", of(&O::yaws), "directions of the sole that are tried, over a turn.")
+    k.add("yaws", &O::yaws, "directions of the sole that are tried, over a turn.")
         .add("spacing_m",
-             of(&O::spacing_m),
+             &O::spacing_m,
              "between footholds, at least, m; 0: all of them.")
         .put(
             "max_footholds",
@@ -177,7 +174,7 @@ rankingKeywords()
             },
             [](O&) { return std::string("None"); },
             "the best so many; None: all there are.")
-        .add("threads", of(&O::threads), "0: one for each core.");
+        .add("threads", &O::threads, "0: one for each core.");
     return k;
   }();
   return keywords;

@@ -77,14 +77,16 @@ class Keywords {
 public:
   explicit Keywords(std::string function) : function_(std::move(function)) {}
 
-  /// \param get a function from the options to a reference to the one
+  /// \param get the member of the options, or a function from them to a reference
   template <typename Get>
   Keywords& add(const std::string& name, Get get, const std::string& help)
   {
     return put(
         name,
-        [name, get](Options& o, py::handle value) { read(name, value, get(o)); },
-        [get](Options& o) { return show(get(o)); },
+        [name, get](Options& o, py::handle value) {
+          read(name, value, std::invoke(get, o));
+        },
+        [get](Options& o) { return show(std::invoke(get, o)); },
         help);
   }
 
@@ -98,9 +100,11 @@ public:
     return put(
         name,
         [name, names, get](Options& o, py::handle value) {
-          get(o) = readWord(names, name, value);
+          std::invoke(get, o) = readWord(names, name, value);
         },
-        [names, get](Options& o) { return "'" + std::string(names.of(get(o))) + "'"; },
+        [names, get](Options& o) {
+          return "'" + std::string(names.of(std::invoke(get, o))) + "'";
+        },
         help);
   }
 

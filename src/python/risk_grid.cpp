@@ -36,14 +36,11 @@ const Keywords<RiskGridOptions>&
 gridKeywords()
 {
   static const Keywords<RiskGridOptions> keywords = [] {
-    const auto of = [](auto member) {
-      return [member](RiskGridOptions& o) -> decltype(auto) { return (o.*member); };
-    };
     using O = RiskGridOptions;
     Keywords<RiskGridOptions> k("risk_grid");
-    k.add("resolution_m", of(&O::resolution_m), "side of a cell, m.")
+    k.add("resolution_m", &O::resolution_m, "side of a cell, m.")
         .add("yaws",
-             of(&O::yaws),
+             &O::yaws,
              "directions of the sole that are tried in every cell, over a turn.")
         .put(
             "bounds",
@@ -51,7 +48,7 @@ gridKeywords()
             [](O&) { return std::string("None"); },
             "(2, 2): lowest x and y, highest x and y, axes of the grid, m; None: what "
             "the map has seen.")
-        .add("threads", of(&O::threads), "0: one for each core.");
+        .add("threads", &O::threads, "0: one for each core.");
     return k;
   }();
   return keywords;
