@@ -268,6 +268,30 @@ loadOptions(const InputOptions& options, const Sensor& sensor)
   return load;
 }
 
+LoadOptions
+loadOptions(const InputOptions& options,
+            const Sensor& sensor,
+            const CloudReading& reading)
+{
+  LoadOptions load = loadOptions(options, sensor);
+  if (!reading.file)
+    return load;
+  const CloudFileInfo& file = *reading.file;
+  if (!options.unit)
+    load.unit_m = file.unit_m;
+  if (!options.axes)
+    load.axes = file.axes;
+  if (file.is_depth_image && !options.depth_scale_given) {
+    load.depth_scale = file.depth_scale;
+    load.depth_scale_given = true;
+  }
+  if (file.camera && !options.intrinsics) {
+    load.camera = *file.camera;
+    load.camera_given = true;
+  }
+  return load;
+}
+
 RangeCloud
 withoutPatternMap(const std::string& path,
                   const RangeCloud& cloud,

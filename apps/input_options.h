@@ -29,6 +29,13 @@ struct InputOptions {
   std::uint64_t max_points = LoadOptions{}.max_points;
 };
 
+/// How the cloud of a result was read, as far as the result tells.
+struct CloudReading {
+  std::string cloud; ///< file
+  std::optional<CloudFileInfo> file;
+  std::optional<Pose> sensor_pose; ///< in the frame of the points
+};
+
 /// Adds CLOUD... and what addSensorOptions() adds. `options` must outlive the parsing.
 void addInputOptions(CLI::App& command, InputOptions& options);
 
@@ -50,6 +57,11 @@ Sensor loadSensorOption(const std::string& name);
 Sensor sensorOf(const CloudFileInfo& info, const Sensor& nominal);
 
 LoadOptions loadOptions(const InputOptions& options, const Sensor& sensor);
+
+/// The same for the cloud of a result: what the caller does not say is as it was then.
+LoadOptions loadOptions(const InputOptions& options,
+                        const Sensor& sensor,
+                        const CloudReading& reading);
 
 /// The cloud of a file less the sensor's pattern map, if it has one.
 /// \param notices receives a line where the map is not subtracted.

@@ -118,18 +118,31 @@ seenFrom(const Pose& sensor_pose, PicturePoints points)
   return cloud;
 }
 
+CloudReading
+readingOf(const PatchReport& report)
+{
+  return {report.cloud, report.file, report.sensor_pose};
+}
+
 SeenCloud
 loadSeenCloud(const std::string& path,
-              LoadOptions options,
-              const Sensor& sensor,
+              const InputOptions& input,
+              const CloudReading& of_result,
               std::vector<std::string>& notices)
 {
-  CloudFileInfo info;
+  const bool is_own = fs::path(path).filename() == fs::path(of_result.cloud).filename();
+  const CloudReading reading = is_own ? of_result : CloudReading();
+  const Sensor sensor = loadSensorOption(input.sensor_name);
+  LoadOptions options = loadOptions(input, sensor, reading);
   options.colors = true;
+  CloudFileInfo info;
   const RangeCloud raw = loadCloud(path, options, &info);
   const RangeCloud cloud =
       withoutPatternMap(path, raw, matchedSensor(sensorOf(info, sensor), raw), notices);
-  return seenFrom(cloud.sensor_pose, picturePoints(cloud, info.colors));
+  const bool is_said = input.sensor_pose || input.viewpoint;
+  const Pose pose =
+      is_said ? cloud.sensor_pose : reading.sensor_pose.value_or(cloud.sensor_pose);
+  return seenFrom(pose, picturePoints(cloud, info.colors));
 }
 
 Standpoint

@@ -50,12 +50,16 @@ std::optional<std::string> findCloud(const std::string& result,
 /// all sides, and clouds whose file does not tell where the sensor stood.
 SeenCloud seenFrom(const Pose& sensor_pose, PicturePoints points);
 
-/// \param sensor whose pattern map, if it has one, is taken off.
-/// \param notices receives a line where that cannot be done.
+CloudReading readingOf(const PatchReport& report);
+
+/// A cloud, less the pattern map of the sensor, if it has one. Where its file has the
+/// name of the result's cloud and the caller says nothing else, it is read and seen as
+/// it was for that.
+/// \param notices receives a line where that cannot be taken off.
 /// \throw std::runtime_error "PATH: cause".
 SeenCloud loadSeenCloud(const std::string& path,
-                        LoadOptions options,
-                        const Sensor& sensor,
+                        const InputOptions& input,
+                        const CloudReading& of_result,
                         std::vector<std::string>& notices);
 
 /// Up is -y where the cloud is in the frame of its camera, else z.

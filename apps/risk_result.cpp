@@ -1,5 +1,7 @@
 #include "risk_result.h"
 
+#include "io/input_json.h"
+
 #include <holdfast/contact/names.h>
 #include <holdfast/fit/options.h>
 #include <holdfast/patch/names.h>
@@ -38,7 +40,7 @@ poseFrom(const Json& json, const Eigen::Vector3d& offset)
 {
   const Eigen::Vector4d q = vectorFrom<4>(json.at("orientation_wxyz"));
   if (!(q.norm() > 0.5))
-    throw std::runtime_error("has a foothold without orientation");
+    throw std::runtime_error("has a pose without orientation");
   return {Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized().toRotationMatrix(),
           vectorFrom<3>(json.at("position")) - offset};
 }
@@ -166,6 +168,9 @@ resultFrom(Json json)
   result.source = json.at("source").get<std::string>();
   result.is_of_map = json.at("frame").get<std::string>() == "map";
   result.offset = vectorFrom<3>(json.at("offset"));
+  result.sensor_pose = poseFrom(json.at("sensor"), result.offset);
+  if (const auto input = json.find("input"); input != json.end())
+    result.file = io::inputFromJson(*input);
   result.radius_m = json.value("radius_m", 0.0);
   for (const Json& tried : json.at("patches"))
     result.patches.push_back(triedFrom(tried, result));

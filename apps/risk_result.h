@@ -2,6 +2,7 @@
 #pragma once
 
 #include <holdfast/contact/foothold.h>
+#include <holdfast/io/cloud_io.h>
 #include <holdfast/pcl/patch_extraction.h>
 
 #include <nlohmann/json.hpp>
@@ -35,6 +36,8 @@ struct PictureSole {
 struct RiskResult {
   std::string source; ///< file
   bool is_of_map = false; ///< else of a cloud
+  std::optional<CloudFileInfo> file; ///< how that was read; not of a map
+  Pose sensor_pose; ///< at the last frame, in the frame of the points
   Eigen::Vector3d offset = Eigen::Vector3d::Zero(); ///< PatchReport::offset
   double radius_m = 0.0; ///< of the patches
   std::vector<TriedPatch> patches; ///< all of them

@@ -13,6 +13,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <limits>
+#include <memory>
 #include <set>
 #include <string>
 #include <vector>
@@ -271,6 +272,66 @@ TEST_F(RenderProgram, ScansFromAllSidesAreSeenFromAside)
   EXPECT_NE(run.err.find("note: "), std::string::npos);
   EXPECT_NE(run.err.find("not seen from a sensor"), std::string::npos);
   EXPECT_GT(readPicture(output_).countOther(kWhite), 1000);
+}
+
+/// A bowl in millimetres and axes of OpenGL, and one as a depth image in units of
+/// 0.2 mm by a camera of its own: what a file does not say, and options do.
+struct OddFile {
+  std::string name;
+  std::string bytes;
+  Names options; ///< that it must be read with
+};
+
+std::vector<OddFile>
+oddFiles()
+{
+  const RangeCloud bowl = test::bowlCloud(120, 90);
+  RangeCloud turned = bowl;
+  const auto points = std::make_shared<pcl::PointCloud<pcl::PointXYZ>>(*bowl.points);
+  turned.points = points;
+  const Eigen::Matrix3f turn =
+      1000.0F * turnFromCamera(CloudAxes::OpenGl).cast<float>();
+  for (pcl::PointXYZ& point : *points)
+    point.getVector3fMap() = turn * point.getVector3fMap();
+  const Camera camera = test::smallCamera(120, 90);
+  std::string intrinsics;
+  for (const double number : {camera.fx, camera.fy, camera.cx, camera.cy})
+    intrinsics += (intrinsics.empty() ? "" : ",") + std::to_string(number);
+  return {
+      {"bowl.pcd", test::compressedPcd(turned), {"--unit", "mm", "--axes", "opengl"}},
+      {"bowl.pgm",
+       test::pgmBytes(bowl, 5000.0),
+       {"--depth-scale", "5000", "--intrinsics", intrinsics}}};
+}
+
+TEST_F(RenderProgram, CloudsAreReadAsForTheirResult)
+{
+  for (const OddFile& file : oddFiles()) {
+    SCOPED_TRACE(file.name);
+    const std::string cloud = folder_ + "/" + file.name;
+    test::writeFile(cloud, file.bytes);
+    Names fit{"fit", cloud, "-o", folder_, "--quiet"};
+    fit.insert(fit.end(), file.options.begin(), file.options.end());
+    const test::ProgramRun fitted = test::runProgram(folder_, fit);
+    ASSERT_EQ(fitted.exit_code, 0) << fitted.err;
+    Names fits{folder_ + "/bowl.patches.json", "--size", "300x240"};
+    const Picture picture = render(fits);
+    fits.insert(fits.end(), file.options.begin(), file.options.end());
+    EXPECT_EQ(picture.pixels, render(fits).pixels);
+
+    Names risk{"risk", cloud, "--foot", "point_foot", "--quiet"};
+    risk.insert(risk.end(), file.options.begin(), file.options.end());
+    risk.insert(risk.end(), {"-o", folder_ + "/risk.json"});
+    const test::ProgramRun ranked = test::runProgram(folder_, risk);
+    ASSERT_EQ(ranked.exit_code, 0) << ranked.err;
+    Names risks{folder_ + "/risk.json", "--color", "risk", "--size", "300x240"};
+    const Picture of_risk = render(risks);
+    risks.insert(risks.end(), file.options.begin(), file.options.end());
+    EXPECT_EQ(of_risk.pixels, render(risks).pixels);
+    // What is said is as it is said.
+    fits.insert(fits.end(), {"--viewpoint", "0.02", "0", "0"});
+    EXPECT_NE(picture.pixels, render(fits).pixels);
+  }
 }
 
 TEST_F(RenderProgram, BadResultsAreNamed)

@@ -114,13 +114,13 @@ mapSubject(const std::string& name, std::vector<ExtractedPatch> patches)
 
 /// Points and sensor of a cloud.
 Subject
-cloudSubject(const std::string& path, const RenderSettings& settings)
+cloudSubject(const std::string& path,
+             const CloudReading& reading,
+             const RenderSettings& settings)
 {
-  const Sensor sensor = loadSensorOption(settings.input.sensor_name);
   std::vector<std::string> notices;
   Subject subject;
-  subject.cloud =
-      loadSeenCloud(path, loadOptions(settings.input, sensor), sensor, notices);
+  subject.cloud = loadSeenCloud(path, settings.input, reading, notices);
   for (const std::string& notice : notices)
     if (!settings.quiet)
       printNotice(path + ": " + notice);
@@ -142,11 +142,11 @@ riskSubject(const std::string& result, const RenderSettings& settings)
   }
   Subject subject;
   if (!settings.cloud.empty())
-    subject = cloudSubject(settings.cloud, settings);
+    subject = cloudSubject(settings.cloud, risk.reading, settings);
   else if (risk.is_of_map)
     subject = mapSubject(risk.source, risk.patches);
   else
-    subject = cloudSubject(cloudOf(result, risk.source), settings);
+    subject = cloudSubject(cloudOf(result, risk.source), risk.reading, settings);
   subject.title = fmt::format("{}, {} footholds on {} patches",
                               fs::path(risk.source).filename().string(),
                               risk.soles.size(),
@@ -170,7 +170,7 @@ loadSubject(const std::string& result, const RenderSettings& settings)
     return mapSubject(report.cloud, std::move(patches));
   const std::string path =
       settings.cloud.empty() ? cloudOf(result, report.cloud) : settings.cloud;
-  Subject subject = cloudSubject(path, settings);
+  Subject subject = cloudSubject(path, readingOf(report), settings);
   subject.patches = std::move(patches);
   subject.title = fmt::format("{}, {} {}",
                               fs::path(path).filename().string(),

@@ -30,8 +30,11 @@ readRisk(const std::string& text)
                              "shows");
   RiskResult result = readRiskResult(text);
   RiskPicture picture;
-  picture.source = std::move(result.source);
+  picture.source = result.source;
   picture.is_of_map = result.is_of_map;
+  picture.reading = {std::move(result.source),
+                     std::move(result.file),
+                     result.sensor_pose};
   picture.soles = std::move(result.soles);
   for (TriedPatch& tried : result.patches)
     if (isUsable(tried.patch.fit.status)) {

@@ -1,6 +1,7 @@
 /// \file Pictures of what `holdfast risk` has found.
 #pragma once
 
+#include "input_options.h"
 #include "render_colors.h"
 #include "risk_result.h"
 #include "view.h"
@@ -14,6 +15,7 @@ namespace holdfast::app {
 struct RiskPicture {
   std::string source; ///< file
   bool is_of_map = false; ///< else of a cloud
+  CloudReading reading; ///< of that
   std::vector<ExtractedPatch> patches;
   std::vector<Rgb> colors; ///< one each
   std::vector<PictureSole> soles;

@@ -131,7 +131,7 @@ addSubjectOptions(CLI::App& command, RenderSettings& settings)
           .add_option("--cloud",
                       settings.cloud,
                       "Cloud to draw below the patches; default: the one RESULT names, "
-                      "in the working folder or beside RESULT")
+                      "in the working folder or beside RESULT, read as it was for it")
           ->type_name("FILE")
           ->group("Input");
   command

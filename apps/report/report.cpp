@@ -97,7 +97,7 @@ addReportOptions(CLI::App& command, ReportSettings& settings)
       .add_option("--cloud",
                   settings.cloud,
                   "Cloud to show below the patches; default: the one RESULT names, in "
-                  "the working folder or beside RESULT")
+                  "the working folder or beside RESULT, read as it was for it")
       ->type_name("FILE")
       ->group("Input");
   addSensorOptions(command, settings.input);

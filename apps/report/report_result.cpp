@@ -2,10 +2,6 @@
 
 #include "io/json_split.h"
 
-#include <holdfast/io/names.h>
-
-#include <Eigen/Geometry>
-
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
@@ -77,43 +73,6 @@ addRisk(const TriedPatch& tried, Json& extras)
     extras["risk"] = *tried.total;
 }
 
-Eigen::Vector3d
-vectorFrom(const Json& json)
-{
-  return {json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>()};
-}
-
-/// Of the result's sensor, in the frame of the points.
-std::optional<Pose>
-sensorPoseOf(const ReportResult& result)
-{
-  const Json sensor = result.head.value("sensor", Json::object());
-  if (!sensor.contains("position") || !sensor.contains("orientation_wxyz"))
-    return std::nullopt;
-  const Json& q = sensor.at("orientation_wxyz");
-  const Eigen::Quaterniond turn(q.at(0).get<double>(),
-                                q.at(1).get<double>(),
-                                q.at(2).get<double>(),
-                                q.at(3).get<double>());
-  return Pose{turn.normalized().toRotationMatrix(),
-              vectorFrom(sensor.at("position")) - result.report.offset};
-}
-
-/// How the cloud was read when it was fitted, unless the caller says otherwise.
-LoadOptions
-loadOptionsOf(const ReportResult& result,
-              const InputOptions& input,
-              const Sensor& sensor)
-{
-  LoadOptions options = loadOptions(input, sensor);
-  const Json file = result.head.value("input", Json::object());
-  if (!input.unit)
-    options.unit_m = file.value("unit_m", options.unit_m);
-  if (!input.axes && file.contains("axes"))
-    options.axes = kCloudAxesNames.find(file.at("axes").get<std::string>());
-  return options;
-}
-
 /// What a page shows of a result of `holdfast risk`.
 ReportResult
 riskReport(const std::string& path, const std::string& text)
@@ -131,6 +90,8 @@ riskReport(const std::string& path, const std::string& text)
   result.report.cloud = risk.source;
   result.report.is_of_map = risk.is_of_map;
   result.report.offset = risk.offset;
+  result.report.file = risk.file;
+  result.report.sensor_pose = risk.sensor_pose;
   for (const TriedPatch& tried : risk.patches) {
     result.report.result.patches.push_back(tried.patch);
     Json& extras = result.extras.emplace_back(Json::object());
@@ -194,7 +155,6 @@ readReportResults(const std::string& path)
   for (const std::string& text : objectsOf(readResultText(path))) {
     try {
       results.push_back(reportOf(path, text));
-      sensorPoseOf(results.back());
     }
     catch (const Json::exception& error) {
       throw std::runtime_error(path + ": no result of holdfast: " + error.what());
@@ -232,8 +192,7 @@ joinRisks(std::vector<ReportResult>& results)
 bool
 namesCloud(const ReportResult& result)
 {
-  return !result.report.is_of_map &&
-         (result.head.contains("input") || !result.has_fits);
+  return !result.report.is_of_map && (result.report.file || !result.has_fits);
 }
 
 void
@@ -257,13 +216,8 @@ addCloud(ReportResult& result,
       result.cloud_note = "The result names no file of points: --cloud FILE adds one.";
     return;
   }
-  const Sensor sensor = loadSensorOption(input.sensor_name);
   std::vector<std::string> about;
-  result.cloud =
-      loadSeenCloud(*path, loadOptionsOf(result, input, sensor), sensor, about);
-  // The caller of the fit may have said where the sensor stood.
-  if (const auto pose = sensorPoseOf(result))
-    result.cloud = seenFrom(*pose, std::move(result.cloud->points));
+  result.cloud = loadSeenCloud(*path, input, readingOf(result.report), about);
   result.cloud_file = *path;
   for (const std::string& notice : about)
     notices.push_back(*path + ": " + notice);
@@ -278,7 +232,7 @@ seenOf(const ReportResult& result)
   for (const ExtractedPatch& patch : result.report.result.patches)
     if (hasShape(patch))
       middles.positions.push_back(patch.fit.patch.c);
-  return seenFrom(sensorPoseOf(result).value_or(Pose()), std::move(middles));
+  return seenFrom(result.report.sensor_pose, std::move(middles));
 }
 
 bool

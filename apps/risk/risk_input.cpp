@@ -52,6 +52,7 @@ groundOfCloud(const RiskSettings& settings, const Foot& foot)
   ground.notices = inputNotices(settings.input, file);
   const Sensor taken_by = sensorOf(file, sensor);
   cloud = withoutPatternMap(settings.source, cloud, taken_by, ground.notices);
+  ground.file = file;
   ground.offset = cloud.offset;
   if (!cloud.sensor_pose_given || cloud.sensor_pose.R.isIdentity())
     ground.image_down = cloud.sensor_pose.R.col(1);

@@ -5,6 +5,7 @@
 
 #include <holdfast/contact/foot.h>
 #include <holdfast/fusion/patch_map.h>
+#include <holdfast/io/cloud_io.h>
 
 #include <optional>
 #include <string>
@@ -15,6 +16,7 @@ namespace holdfast::app {
 struct Ground {
   PatchMap map;
   bool is_map_file = false; ///< else a cloud
+  std::optional<CloudFileInfo> file; ///< how the cloud was read
   /// Of the map's frame in that of the file (RangeCloud::offset).
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();
   /// Down in the image, where the frame is that of a camera and of nothing else.

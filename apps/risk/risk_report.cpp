@@ -1,5 +1,7 @@
 #include "risk/risk_report.h"
 
+#include "io/input_json.h"
+
 #include <holdfast/contact/names.h>
 #include <holdfast/patch/names.h>
 #include <holdfast/patch/parameters.h>
@@ -217,18 +219,19 @@ writeRiskJson(std::ostream& out, const RiskReport& report)
   for (const std::string_view assumption : kRiskAssumptions)
     assumptions.push_back(assumption);
   const Ground& ground = report.ground;
-  const Json head{
-      {"source", report.source},
-      {"frame", ground.is_map_file ? "map" : "cloud"},
-      {"sensor", poseJson(ground.map.pose(), ground.offset)},
-      {"offset", vectorJson(ground.offset)},
-      {"radius_m", ground.radius_m},
-      {"load_direction", vectorJson(report.options.load_direction)},
-      {"foot", footJson(report.foot)},
-      {"options",
-       {{"yaws", report.options.yaws}, {"spacing_m", report.options.spacing_m}}},
-      {"assumptions", assumptions},
-      {"ranking", rankingJson(report.ranking)}};
+  Json head{{"source", report.source},
+            {"frame", ground.is_map_file ? "map" : "cloud"},
+            {"sensor", poseJson(ground.map.pose(), ground.offset)},
+            {"offset", vectorJson(ground.offset)},
+            {"radius_m", ground.radius_m},
+            {"load_direction", vectorJson(report.options.load_direction)},
+            {"foot", footJson(report.foot)},
+            {"options",
+             {{"yaws", report.options.yaws}, {"spacing_m", report.options.spacing_m}}},
+            {"assumptions", assumptions},
+            {"ranking", rankingJson(report.ranking)}};
+  if (ground.file)
+    head["input"] = io::inputJson(*ground.file);
   std::string opening = text(head);
   opening.pop_back(); // the brace, for the lists to follow
   out << opening;

@@ -280,6 +280,7 @@ backProject(DepthImage& image, const LoadOptions& options)
   RawCloud cloud;
   CloudFileInfo& info = cloud.info;
   info.is_depth_image = true;
+  info.depth_scale = options.depth_scale;
   info.fields = {"depth"};
   info.notices = std::move(image.notices);
   const Camera camera = cameraOf(image, options, info);

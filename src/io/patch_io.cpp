@@ -1,3 +1,4 @@
+#include "input_json.h"
 #include "json_split.h"
 #include "json_text.h"
 #include "pcd_writer.h"
@@ -5,7 +6,6 @@
 #include "parallel/parallel_for.h"
 
 #include <holdfast/fit/names.h>
-#include <holdfast/io/names.h>
 #include <holdfast/io/patch_io.h>
 #include <holdfast/patch/tessellation.h>
 #include <holdfast/pcl/conversions.h>
@@ -48,17 +48,6 @@ vectorJson(const Eigen::MatrixBase<Derived>& v)
   return array;
 }
 
-Json
-cameraJson(const Camera& camera)
-{
-  return {{"width", camera.width},
-          {"height", camera.height},
-          {"fx", camera.fx},
-          {"fy", camera.fy},
-          {"cx", camera.cx},
-          {"cy", camera.cy}};
-}
-
 /// What the covariances of the points came from.
 std::string
 noiseName(const PatchReport& report)
@@ -89,27 +78,10 @@ sensorJson(const PatchReport& report)
   return {{"name", sensor.name},
           {"noise", noiseName(report)},
           {"pattern", patternJson(sensor.pattern)},
-          {"camera", cameraJson(sensor.camera)},
+          {"camera", io::cameraJson(sensor.camera)},
           {"position", vectorJson(position)},
           {"orientation_wxyz", {q.w(), q.x(), q.y(), q.z()}},
           {"viewpoint_credible", report.result.viewpoint_is_credible}};
-}
-
-/// How the file was read; turn: from camera axes to those of the file's sensor frame.
-Json
-inputJson(const CloudFileInfo& file)
-{
-  const Eigen::Matrix3d turn = turnFromCamera(file.axes);
-  Json rows = Json::array();
-  for (Eigen::Index i = 0; i < 3; ++i)
-    rows.push_back(vectorJson(turn.row(i)));
-  return {{"format", file.format},
-          {"axes", kCloudAxesNames.of(file.axes)},
-          {"turn", rows},
-          {"unit_m", file.unit_m},
-          {"zero_points", file.zero_points},
-          {"out_of_range_pixels", file.out_of_range_pixels},
-          {"camera", file.camera ? cameraJson(*file.camera) : Json()}};
 }
 
 Json
@@ -782,7 +754,7 @@ writeJson(std::ostream& out, const PatchReport& report, JsonLayout layout)
   if (report.timestamp_us)
     member("timestamp_us", *report.timestamp_us);
   if (report.file)
-    member("input", inputJson(*report.file));
+    member("input", io::inputJson(*report.file));
   member("sensor", sensorJson(report));
   member("offset", vectorJson(report.offset));
   member("cloud_points", pointsJson(report.result.points));
@@ -794,6 +766,23 @@ writeJson(std::ostream& out, const PatchReport& report, JsonLayout layout)
   member("rejected", rejectedJson(report.result));
   out << "\"timing\":" << text(timingJson(report)) << gap << "}\n";
 }
+
+namespace {
+
+/// In the frame of the points.
+Pose
+sensorPoseFrom(const Json& json, const Eigen::Vector3d& offset)
+{
+  std::array<double, 3> c = json.at("position");
+  std::array<double, 4> q = json.at("orientation_wxyz");
+  const Eigen::Quaterniond turn(q[0], q[1], q[2], q[3]);
+  if (!(turn.norm() > 0.5))
+    throw std::runtime_error("no result of holdfast: its sensor has no orientation");
+  return {turn.normalized().toRotationMatrix(),
+          Eigen::Vector3d(c[0], c[1], c[2]) - offset};
+}
+
+} // namespace
 
 PatchReport
 readJson(const std::string& text)
@@ -820,6 +809,10 @@ readJson(const std::string& text)
     else
       for (const Json& patch : json.at("patches"))
         report.result.patches.push_back(readPatch(patch, containment, report.offset));
+    if (const auto input = json.find("input"); input != json.end())
+      report.file = io::inputFromJson(*input);
+    if (const auto sensor = json.find("sensor"); sensor != json.end())
+      report.sensor_pose = sensorPoseFrom(*sensor, report.offset);
     readRejected(json.at("rejected"), report.result);
     return report;
   }

@@ -68,6 +68,7 @@ struct CloudFileInfo {
   /// Camera of a depth image, or the one the caller gave for a cloud.
   std::optional<Camera> camera;
   double unit_m = 1.0; ///< as applied
+  double depth_scale = 1000.0; ///< as applied to a depth image
   CloudAxes axes = CloudAxes::Camera; ///< as applied
   int zero_points = 0; ///< taken as invalid: 0 0 0 stands for "no return"
   int out_of_range_pixels = 0; ///< taken as invalid

@@ -51,10 +51,11 @@ enum class JsonLayout : std::uint8_t {
 /// null where it was not asked for; chi-square over chi2_expected is the fit's.
 void writeJson(std::ostream& out, const PatchReport& report, JsonLayout layout);
 
-/// Reads the cloud's name, the fingerprint, the offset, the patches and the rejected
-/// counts of a JSON object written by writeJson(); the other members of the report keep
-/// their defaults. Positions are again those of the points, with the offset taken off.
-/// \throw std::runtime_error when the text is no such object.
+/// Reads the cloud's name, the fingerprint, how its file was read, the sensor's pose,
+/// the offset, the patches and the rejected counts of a JSON object written by
+/// writeJson(); the other members of the report keep their defaults. Positions are
+/// again those of the points, with the offset taken off. \throw std::runtime_error when
+/// the text is no such object.
 PatchReport readJson(const std::string& text);
 
 /// Writes the patches as one triangle mesh (PLY: vertices x y z in metres, red green
