@@ -15,18 +15,21 @@ source "$root/cmake/setup.sh"
 folder=$root/build-sanitize
 sanitizers="address;undefined"
 programs=OFF
+several=OFF # sources at a time, where it is for more than a few tests
 tests=(fit_degenerate pcl_misuse point_types openni2_grabber cloud_io patch_io
   atomic_file config locale patch_extraction parallel)
 case ${1:-} in
 --all)
   folder=$root/build-sanitize-all
   programs=ON
+  several=ON
   tests=()
   shift
   ;;
 --thread)
   folder=$root/build-sanitize-thread
   sanitizers=thread
+  several=ON
   tests=(patch_extraction frame_extraction monte_carlo consistency parallel
     openni2_grabber)
   shift
@@ -51,6 +54,7 @@ build_in "$folder" -DCMAKE_BUILD_TYPE=RelWithDebInfo \
   -DCMAKE_CXX_FLAGS_RELWITHDEBINFO="-O1 -g1 -DNDEBUG" \
   -DHOLDFAST_SANITIZE="$sanitizers" -DHOLDFAST_WITH_HIGHWAY=OFF \
   -DHOLDFAST_BUILD_APPS=$programs -DHOLDFAST_BUILD_SAMPLES=$programs \
+  -DCMAKE_UNITY_BUILD=$several -DCMAKE_UNITY_BUILD_BATCH_SIZE=16 \
   -DHOLDFAST_BUILD_BENCHMARKS=OFF "${targets[@]}"
 
 # PCL itself is not instrumented, so containers that it fills and we read (or the other
