@@ -42,7 +42,7 @@ run . neighborhoods --trials 200 --seed 7
 run . fusion --seed 7
 run . map --seed 7 --stride 3 --scene boulder_field
 # Contact risk against draws, and against what happens to feet on maps of walks.
-run . risk --seed 7 --trials 1 --frames 24 --stride 3
+run . risk --seed 7 --trials 12 --frames 16 --stride 3
 if [[ -n $recordings ]]; then
   ln -s "$recordings" recordings
   run . figure6 --data recordings
