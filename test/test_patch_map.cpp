@@ -537,6 +537,83 @@ TEST(Registration, SaysWhatAPlaneDoesNotTell)
   EXPECT_LT(std::abs(result.pose.c.z()), 4.0 * std::sqrt(result.covariance(5, 5)));
 }
 
+/// A plane of the map's frame with patches on it, seen from anywhere: each frame has
+/// others, as a sensor finds them.
+struct SeenPlane {
+  Pose pose; ///< z along the normal, towards the sensor
+
+  explicit SeenPlane(Random& random)
+  {
+    // The sensor looks along z of the map, from 0.6 to 1.6 m, tilted up to 0.9 rad.
+    const double tilt = random.uniform(0.0, 0.9), turn = random.uniform(-3.0, 3.0);
+    const Eigen::Vector3d axis(std::cos(turn), std::sin(turn), 0.0);
+    pose = {expMap(tilt * axis) * frameFromZ(-Eigen::Vector3d::UnitZ()),
+            {0.0, 0.0, random.uniform(0.6, 1.6)}};
+  }
+
+  std::vector<Measurement> measure(const Pose& sensor, Random& random) const
+  {
+    std::vector<Measurement> measurements;
+    for (int i = -5; i <= 5; ++i)
+      for (int j = -5; j <= 5; ++j) { // too far apart to share points
+        const Pose anchor{
+            pose.R * expMap(random.uniform(-3.0, 3.0) * Eigen::Vector3d::UnitZ()),
+            pose.toWorld({0.12 * i, 0.12 * j, 0.0})};
+        Measurement m =
+            measurementAt(measurements.size() + 1, {0.0, 0.0, 1.0}, &random);
+        m.anchor = sensor.inverse() * anchor;
+        measurements.push_back(m);
+      }
+    return measurements;
+  }
+};
+
+// F9. Along the plane and about its normal nothing is known, whatever the plane: these
+// directions stay as they were, the other three are found with their covariance.
+TEST(Registration, SaysWhatNoPlaneTells)
+{
+  constexpr int kTrials = 60;
+  double nees = 0.0;
+  for (std::uint64_t trial = 0; trial < kTrials; ++trial) {
+    Random random(trial);
+    const SeenPlane plane(random);
+    PatchMapOptions options;
+    options.max_tilt_rad = 1.2;
+    PatchMap map(options);
+    map.update(plane.measure(Pose(), random));
+    const Pose truth{expMap(0.005 * random.normalVector()),
+                     0.005 * random.normalVector()};
+    const RegistrationResult result =
+        registerPatches(plane.measure(truth, random), map, Pose());
+    ASSERT_EQ(result.status, RegistrationStatus::Converged);
+    ASSERT_EQ(result.null_space.cols(), 3);
+
+    Eigen::Matrix<double, 6, 3> free = Eigen::Matrix<double, 6, 3>::Zero();
+    free.block<3, 2>(3, 0) = plane.pose.R.leftCols<2>();
+    free.block<3, 1>(0, 2) = result.pose.R.transpose() * plane.pose.R.col(2);
+    // The normal is known as well as slopes are on average, which turns each of three
+    // directions towards each of the others: nine numbers.
+    const double known = 5.0 * jetSigmas()[1] * std::sqrt(9.0 / 121.0);
+    const Eigen::Matrix<double, 6, 6> basis =
+        Eigen::HouseholderQR<Eigen::Matrix<double, 6, 3>>(result.null_space)
+            .householderQ();
+    const auto N = basis.leftCols<3>(), told = basis.rightCols<3>();
+    EXPECT_LT((free - N * (N.transpose() * free)).norm(), known);
+    const JetVector step = poseError(Pose(), result.pose);
+    // The step turns the directions along which it was none.
+    const double turned = known + step.head<3>().norm();
+    EXPECT_LT((free.transpose() * step).norm(), turned * step.norm());
+
+    const Eigen::Vector3d error = told.transpose() * poseError(truth, result.pose);
+    const Eigen::Matrix3d covariance = told.transpose() * result.covariance * told;
+    nees += error.dot(covariance.inverse() * error) / 3.0 / kTrials;
+  }
+  std::printf("  NEES/dof %.3f\n", nees);
+  const test::NeesBounds bounds(3 * kTrials);
+  EXPECT_LT(nees, bounds.highest);
+  EXPECT_GT(nees, bounds.lowest);
+}
+
 TEST(Registration, StaysWithTheGuessWithoutPairs)
 {
   PatchMap map;
