@@ -514,9 +514,7 @@ PatchMap::fuse(const Measurement& m, const Pose& anchor, MapPatch& patch) const
   const auto jet = transported(m.jet, anchor, patch.anchor, by_third);
   if (!jet)
     return false;
-  JetMatrix white =
-      jet->white +
-      modelError(by_third, thirdToJetOfDisc(patch.radius_m), roughnessOf(patch));
+  JetMatrix white = jet->white;
   if (pose_covariance_)
     white += errorOf(*pose_covariance_, jet->value, patch.anchor);
   const Eigen::Vector3d left = patternLeft(m, patch, options_);
@@ -535,7 +533,8 @@ PatchMap::fuse(const Measurement& m, const Pose& anchor, MapPatch& patch) const
         kept.cwiseQuotient(patch.epoch_kept.cast<double>().cwiseMax(1e-9));
     filter.changePattern(byOrder(step), jet->pattern);
   }
-  if (!filter.update(jet->value, white, gate_))
+  const ThirdToJet off = by_third - thirdToJetOfDisc(patch.radius_m);
+  if (!filter.update(jet->value, white, gate_, off))
     return false;
   patch.jet = filter;
   if (is_new_epoch) {
@@ -546,6 +545,7 @@ PatchMap::fuse(const Measurement& m, const Pose& anchor, MapPatch& patch) const
     patch.epoch_kept = kept.cast<float>();
   }
   addView(m, anchor, patch);
+  patch.jet.setRoughness(roughnessOf(patch));
   return true;
 }
 
@@ -562,11 +562,11 @@ PatchMap::restart(const Measurement& m,
   patch.radius_m = radius_m;
   addView(m, anchor, patch); // which tells how rough it is
   Jet jet = m.jet;
-  jet.white +=
-      modelError(m.design.by_third, thirdToJetOfDisc(radius_m), roughnessOf(patch));
   if (pose_covariance_)
     jet.white += errorOf(*pose_covariance_, jet.value, anchor);
-  patch.jet = JetFilter(jet);
+  patch.jet = JetFilter(jet,
+                        m.design.by_third - thirdToJetOfDisc(radius_m),
+                        roughnessOf(patch));
   beginEpochOf(m, patch);
   patch.epochs = 1;
   patch.taken_in = patch.last_seen = frames_;
