@@ -14,6 +14,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -258,6 +259,50 @@ TEST(FrameMapper, KnowsHowWellItFindsRandomMotions)
               bounds.highest);
   EXPECT_GT(sum / kDegrees, bounds.lowest);
   EXPECT_LT(sum / kDegrees, bounds.highest);
+}
+
+/// Patches born in each of the frames of a camera that stands still.
+std::vector<int>
+birthsStandingStill(const std::string& scene_name, int frames, int threads)
+{
+  const Sensor sensor = smallKinect();
+  const Scene scene = makeScene(scene_name);
+  const FrameSimulator simulator(scene,
+                                 pixelRays(sensor.camera),
+                                 sensor,
+                                 SimulationOptions(),
+                                 PatternOverTime::Fixed,
+                                 Random().seed());
+  MappingOptions options;
+  options.extraction.threads = threads;
+  FrameMapper mapper(sensor, options);
+  std::vector<int> births;
+  FrameReport report;
+  for (int k = 0; k < frames; ++k) {
+    report = mapper.addStill(cloudOf(simulator.frame(k, scene.sensor_pose)),
+                             std::move(report));
+    births.push_back(report.update.born);
+  }
+  return births;
+}
+
+// Seeds find room between anchors for as long as noise moves these; what was seen there
+// leaves none.
+TEST(FrameMapper, BearsNextToNothingWhereAllWasSeen)
+{
+  constexpr double kFew =
+      0.03; // of the first frame's: what came out for the first time
+  for (const char* scene : {"rocks", "mix"}) {
+    const std::vector<int> births = birthsStandingStill(scene, 20, 1);
+    std::printf("  %s:", scene);
+    for (const int born : births)
+      std::printf(" %d", born);
+    std::printf("\n");
+    for (std::size_t k = 3; k < births.size(); ++k)
+      EXPECT_LE(births[k], kFew * births[0]) << scene << ", frame " << k;
+    const std::vector<int> others = birthsStandingStill(scene, 5, 2);
+    EXPECT_TRUE(std::equal(others.begin(), others.end(), births.begin())) << scene;
+  }
 }
 
 TEST(FrameMapper, DoesNotDependOnThreads)

@@ -408,11 +408,34 @@ PatchMap::hasAnchorWithin(const Eigen::Vector3d& place, double distance_m) const
   return is_there;
 }
 
+bool
+PatchMap::covers(const MapPatch& patch, const Eigen::Vector3d& place) const
+{
+  const Eigen::Vector3d p = patch.anchor.toLocal(place);
+  const JetVector& jet = patch.jet.value();
+  const double x = p.x(), y = p.y();
+  const double height = jet[0] + jet[1] * x + jet[2] * y +
+                        0.5 * (jet[3] * x * x + 2.0 * jet[4] * x * y + jet[5] * y * y);
+  return std::abs(p.z() - height) < reach() &&
+         patch.support.contains(x / patch.radius_m, y / patch.radius_m);
+}
+
+bool
+PatchMap::isCovered(const Eigen::Vector3d& place) const
+{
+  bool is_covered = false;
+  visitWithin(place, SupportGrid::kReach * options_.radius_m, [&](int i) {
+    is_covered |= covers(patches_[static_cast<std::size_t>(i)], place);
+  });
+  return is_covered;
+}
+
 UpdateReport
 PatchMap::update(const std::vector<Measurement>& measurements,
                  const std::vector<std::uint64_t>& seen_through)
 {
   ++frames_;
+  first_of_frame_ = next_id_;
   UpdateReport report;
   order_.resize(measurements.size());
   std::iota(order_.begin(), order_.end(), 0);
@@ -498,12 +521,27 @@ PatchMap::take(const Measurement& m, UpdateReport& report)
   }
   if (refused)
     conflict(*refused, &m, report);
-  else if (is_near)
+  else if (is_near || isOnFormer(anchor))
     ++report.surplus;
   else {
     bear(m, anchor);
     ++report.born;
   }
+}
+
+// Supports of the same frame lie as dense as was asked for; further ones between those
+// of former frames would be born as long as a sensor looks, since noise moves the
+// centre of what is seen.
+bool
+PatchMap::isOnFormer(const Pose& anchor) const
+{
+  bool is_on = false;
+  visitWithin(anchor.c, SupportGrid::kReach * options_.radius_m, [&](int i) {
+    const MapPatch& patch = patches_[static_cast<std::size_t>(i)];
+    is_on |= patch.id < first_of_frame_ && isFacingAs(patch, anchor) &&
+             covers(patch, anchor.c);
+  });
+  return is_on;
 }
 
 bool
