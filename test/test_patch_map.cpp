@@ -80,10 +80,10 @@ areEqual(const PatchMap& a, const PatchMap& b)
   return true;
 }
 
-TEST(PatchMap, KeepsAPatchInAKibibyteAndAQuarter)
+TEST(PatchMap, KeepsAPatchInAKibibyte)
 {
   // Two chain links beside it.
-  EXPECT_LE(sizeof(MapPatch) + 2 * sizeof(int), 1280u);
+  EXPECT_LE(sizeof(MapPatch) + 2 * sizeof(int), 1024u);
 }
 
 TEST(PatchMap, CountsEveryMeasurement)

@@ -40,7 +40,7 @@ JetFilter::JetFilter(const Jet& first, const ThirdToJet& by_third, double s3_per
   // j = x + b + D t + w, and nothing else is known of x.
   Joint P;
   P << first.covariance(), -first.pattern, -first.pattern, first.pattern;
-  state_.joint = Packed<12>::of(P);
+  state_.joint = Packed<12, float>::of(P);
   state_.by_third.topRows<6>() = by_third.cast<float>();
   state_.s3_per_m2 = s3_per_m2;
 }
@@ -63,7 +63,7 @@ JetFilter::changePattern(const JetVector& kept, const JetMatrix& pattern)
       kept.asDiagonal() * P.bottomRightCorner<6, 6>() * kept.asDiagonal();
   P.bottomRightCorner<6, 6>() =
       left + JetMatrix(fresh.asDiagonal() * pattern * fresh.asDiagonal());
-  state_.joint = Packed<12>::of(P);
+  state_.joint = Packed<12, float>::of(P);
   state_.pattern = state_.pattern.cwiseProduct(kept).eval();
   state_.by_third.bottomRows<6>() =
       kept.cast<float>().asDiagonal() * state_.by_third.bottomRows<6>().eval();
@@ -74,7 +74,8 @@ JetFilter::inflate(const JetMatrix& covariance)
 {
   for (int i = 0, e = 0; i < 6; e += 6, ++i)
     for (int j = i; j < 6; ++j, ++e)
-      state_.joint.v[static_cast<std::size_t>(e)] += covariance(i, j);
+      state_.joint.v[static_cast<std::size_t>(e)] +=
+          static_cast<float>(covariance(i, j));
 }
 
 void
@@ -131,7 +132,7 @@ JetFilter::update(const JetVector& jet,
     return false;
   state_.value += step.head<6>();
   state_.pattern += step.tail<6>();
-  state_.joint = Packed<12>::of(updated);
+  state_.joint = Packed<12, float>::of(updated);
   state_.by_third = (A + K * (by_third - sum)).cast<float>();
   return true;
 }

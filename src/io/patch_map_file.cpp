@@ -141,12 +141,17 @@ pass(Archive& archive, JetFilter& filter)
   JetFilter::State state = filter.state();
   pass(archive, state.value);
   pass(archive, state.pattern);
-  pass(archive, state.joint.v);
-  // Before, what third derivatives do was in the joint covariance.
+  // Before, what third derivatives do was in the joint covariance, in doubles.
   constexpr std::uint32_t kFirstWithThird = 2;
   if (archive.version() >= kFirstWithThird) {
+    pass(archive, state.joint.v);
     pass(archive, state.by_third);
     archive.value(state.s3_per_m2);
+  }
+  else {
+    Packed<12> joint;
+    pass(archive, joint.v);
+    state.joint = Packed<12, float>::of(joint.matrix());
   }
   filter = JetFilter(state);
 }

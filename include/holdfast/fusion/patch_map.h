@@ -76,7 +76,7 @@ struct PatchMapOptions {
 /// Empty when the options make sense, else one sentence naming the first that does not.
 std::string validityError(const PatchMapOptions& options);
 
-/// One patch of the map. Less than 1.25 KiB with what the map keeps beside it.
+/// One patch of the map. Less than 1 KiB with what the map keeps beside it.
 struct MapPatch {
   std::uint64_t id = 0; ///< never given again
   Pose anchor; ///< frame of the map; exact by definition
