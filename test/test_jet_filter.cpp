@@ -1,5 +1,6 @@
 // Fusion of many views of one spot: NEES, sigma and gate against the truth (FUSION 2,
 // 3).
+#include "support/chi_square_bounds.h"
 #include "support/kinect_pattern.h"
 #include "support/spot.h"
 
@@ -11,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdio>
+#include <limits>
 #include <map>
 #include <vector>
 
@@ -24,6 +26,7 @@ constexpr int kStride = 4; // some 140 points
 struct Trials {
   std::map<int, double> nees; ///< mean over trials, by number of views
   std::map<int, double> sigma; ///< of the height, root mean square
+  std::map<int, double> noise_sigma; ///< the same without third derivatives
   double gated = 0.0; ///< share of the measurements
 };
 
@@ -78,10 +81,12 @@ fuse(const TrialOptions& o)
       const JetMatrix P = patch.jet.covariance();
       result.nees[view] += test::nees(patch.jet.value(), P, *truth) / 6.0 / o.trials;
       result.sigma[view] += P(0, 0) / o.trials;
+      result.noise_sigma[view] += patch.jet.state().joint.v[0] / o.trials;
     }
   }
-  for (auto& sigma : result.sigma)
-    sigma.second = std::sqrt(sigma.second);
+  for (auto* sigmas : {&result.sigma, &result.noise_sigma})
+    for (auto& sigma : *sigmas)
+      sigma.second = std::sqrt(sigma.second);
   result.gated = static_cast<double>(gated) / measured;
   return result;
 }
@@ -120,7 +125,9 @@ TEST(JetFilter, SameSupportIsConsistent)
   for (const int views : {1, 4, 16})
     expectWithin(trials.nees.at(views), 0.95, 1.08, o.trials);
   expectWithin(trials.nees.at(64), 0.95, 1.08 + 0.05, o.trials);
-  EXPECT_NEAR(trials.sigma.at(4) / trials.sigma.at(64), 4.0, 0.4);
+  // That there are no third derivatives, a single patch cannot tell: what they might do
+  // averages no more than supports differ.
+  EXPECT_NEAR(trials.noise_sigma.at(4) / trials.noise_sigma.at(64), 4.0, 0.4);
   EXPECT_GT(trials.gated, 0.007);
   EXPECT_LT(trials.gated, 0.016);
 }
@@ -135,6 +142,68 @@ TEST(JetFilter, OtherSupportsCountAsFarAsTheyDiffer)
   print(trials);
   for (const auto& row : trials.nees)
     expectWithin(row.second, 0.8, 1.2, o.trials);
+}
+
+/// What a fit to a support that is off by a share of the radius, in any direction,
+/// makes of third derivatives beside what the disc does.
+ThirdToJet
+offDisc(Random& random, const Eigen::Vector2d& middle)
+{
+  Pose off;
+  off.c << kRadius * (middle + 0.1 * Eigen::Vector2d(random.normal(), random.normal())),
+      0.0;
+  const ThirdToJet disc = thirdToJetOfDisc(kRadius);
+  return movedThirdToJet(1.2 * disc, off) - disc;
+}
+
+/// Numbers as a fit has them with a sigma of the height of 0.5 mm.
+JetVector
+noise(Random& random)
+{
+  JetVector w;
+  w << 5e-4 * random.normal(), 1e-2 * random.normalVector().head<2>(),
+      random.normalVector();
+  return w;
+}
+
+// Views from one side weigh the same points alike: what third derivatives do is the
+// same error in each of them, and averages over no number of views.
+TEST(JetFilter, ThirdDerivativesDoNotAverage)
+{
+  constexpr int kTrials = 1000;
+  constexpr double kS3 = 200.0;
+  JetVector variance;
+  variance << 25e-8, 1e-4, 1e-4, 1.0, 1.0, 1.0;
+  std::map<int, double> nees;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    Random random(static_cast<std::uint64_t>(trial));
+    const Eigen::Vector4d t = test::randomThirdDerivatives(random, kS3);
+    const Eigen::Vector2d middle(0.2 * random.normal(), 0.2 * random.normal());
+    JetFilter filter;
+    for (int view = 1; view <= 64; ++view) {
+      const ThirdToJet D = offDisc(random, middle);
+      const JetVector jet = D * t + noise(random); // of nothing
+      if (view == 1)
+        filter =
+            JetFilter({jet, variance.asDiagonal(), JetMatrix::Zero()}, D, 0.5 * kS3);
+      else
+        ASSERT_TRUE(filter.update(jet,
+                                  variance.asDiagonal(),
+                                  std::numeric_limits<double>::infinity(),
+                                  D));
+      JetFilter known = filter; // how large they are comes out later
+      known.setRoughness(kS3);
+      nees[view] += test::nees(known.value(), known.covariance(), JetVector::Zero());
+    }
+  }
+  constexpr int kDegrees = 6 * kTrials;
+  const test::NeesBounds bounds(kDegrees);
+  for (const int views : {1, 4, 16, 64}) {
+    const double mean = nees.at(views) / kDegrees;
+    std::printf("  n = %2d: NEES/dof %.3f\n", views, mean);
+    EXPECT_GT(mean, bounds.lowest);
+    EXPECT_LT(mean, bounds.highest);
+  }
 }
 
 TEST(JetFilter, FadingKeepsWhatDoesNotAverage)

@@ -71,8 +71,10 @@ areEqual(const PatchMap& a, const PatchMap& b)
   for (std::size_t i = 0; i < a.patches().size(); ++i) {
     const MapPatch &p = a.patches()[i], &q = b.patches()[i];
     if (p.id != q.id || p.jet.value() != q.jet.value() ||
-        p.jet.joint().v != q.jet.joint().v || p.support.rows() != q.support.rows() ||
-        p.moments != q.moments || p.views != q.views)
+        p.jet.state().joint.v != q.jet.state().joint.v ||
+        p.jet.state().by_third != q.jet.state().by_third ||
+        p.support.rows() != q.support.rows() || p.moments != q.moments ||
+        p.views != q.views)
       return false;
   }
   return true;

@@ -408,11 +408,34 @@ PatchMap::hasAnchorWithin(const Eigen::Vector3d& place, double distance_m) const
   return is_there;
 }
 
+bool
+PatchMap::covers(const MapPatch& patch, const Eigen::Vector3d& place) const
+{
+  const Eigen::Vector3d p = patch.anchor.toLocal(place);
+  const JetVector& jet = patch.jet.value();
+  const double x = p.x(), y = p.y();
+  const double height = jet[0] + jet[1] * x + jet[2] * y +
+                        0.5 * (jet[3] * x * x + 2.0 * jet[4] * x * y + jet[5] * y * y);
+  return std::abs(p.z() - height) < reach() &&
+         patch.support.contains(x / patch.radius_m, y / patch.radius_m);
+}
+
+bool
+PatchMap::isCovered(const Eigen::Vector3d& place) const
+{
+  bool is_covered = false;
+  visitWithin(place, SupportGrid::kReach * options_.radius_m, [&](int i) {
+    is_covered |= covers(patches_[static_cast<std::size_t>(i)], place);
+  });
+  return is_covered;
+}
+
 UpdateReport
 PatchMap::update(const std::vector<Measurement>& measurements,
                  const std::vector<std::uint64_t>& seen_through)
 {
   ++frames_;
+  first_of_frame_ = next_id_;
   UpdateReport report;
   order_.resize(measurements.size());
   std::iota(order_.begin(), order_.end(), 0);
@@ -498,12 +521,27 @@ PatchMap::take(const Measurement& m, UpdateReport& report)
   }
   if (refused)
     conflict(*refused, &m, report);
-  else if (is_near)
+  else if (is_near || isOnFormer(anchor))
     ++report.surplus;
   else {
     bear(m, anchor);
     ++report.born;
   }
+}
+
+// Supports of the same frame lie as dense as was asked for; further ones between those
+// of former frames would be born as long as a sensor looks, since noise moves the
+// centre of what is seen.
+bool
+PatchMap::isOnFormer(const Pose& anchor) const
+{
+  bool is_on = false;
+  visitWithin(anchor.c, SupportGrid::kReach * options_.radius_m, [&](int i) {
+    const MapPatch& patch = patches_[static_cast<std::size_t>(i)];
+    is_on |= patch.id < first_of_frame_ && isFacingAs(patch, anchor) &&
+             covers(patch, anchor.c);
+  });
+  return is_on;
 }
 
 bool
@@ -514,9 +552,7 @@ PatchMap::fuse(const Measurement& m, const Pose& anchor, MapPatch& patch) const
   const auto jet = transported(m.jet, anchor, patch.anchor, by_third);
   if (!jet)
     return false;
-  JetMatrix white =
-      jet->white +
-      modelError(by_third, thirdToJetOfDisc(patch.radius_m), roughnessOf(patch));
+  JetMatrix white = jet->white;
   if (pose_covariance_)
     white += errorOf(*pose_covariance_, jet->value, patch.anchor);
   const Eigen::Vector3d left = patternLeft(m, patch, options_);
@@ -535,7 +571,8 @@ PatchMap::fuse(const Measurement& m, const Pose& anchor, MapPatch& patch) const
         kept.cwiseQuotient(patch.epoch_kept.cast<double>().cwiseMax(1e-9));
     filter.changePattern(byOrder(step), jet->pattern);
   }
-  if (!filter.update(jet->value, white, gate_))
+  const ThirdToJet off = by_third - thirdToJetOfDisc(patch.radius_m);
+  if (!filter.update(jet->value, white, gate_, off))
     return false;
   patch.jet = filter;
   if (is_new_epoch) {
@@ -546,6 +583,7 @@ PatchMap::fuse(const Measurement& m, const Pose& anchor, MapPatch& patch) const
     patch.epoch_kept = kept.cast<float>();
   }
   addView(m, anchor, patch);
+  patch.jet.setRoughness(roughnessOf(patch));
   return true;
 }
 
@@ -562,11 +600,11 @@ PatchMap::restart(const Measurement& m,
   patch.radius_m = radius_m;
   addView(m, anchor, patch); // which tells how rough it is
   Jet jet = m.jet;
-  jet.white +=
-      modelError(m.design.by_third, thirdToJetOfDisc(radius_m), roughnessOf(patch));
   if (pose_covariance_)
     jet.white += errorOf(*pose_covariance_, jet.value, anchor);
-  patch.jet = JetFilter(jet);
+  patch.jet = JetFilter(jet,
+                        m.design.by_third - thirdToJetOfDisc(radius_m),
+                        roughnessOf(patch));
   beginEpochOf(m, patch);
   patch.epochs = 1;
   patch.taken_in = patch.last_seen = frames_;

@@ -17,7 +17,7 @@ namespace holdfast {
 namespace {
 
 constexpr std::string_view kSignature = "holdfast patch map\n";
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 constexpr std::uint64_t kMostPatches = 100'000'000;
 constexpr std::uint64_t kLongestName = 1000, kMostWaves = 1000;
 
@@ -28,6 +28,11 @@ static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
 class Writer {
 public:
   static constexpr bool kReads = false;
+
+  static constexpr std::uint32_t version()
+  {
+    return kVersion;
+  }
 
   template <typename T>
   void value(const T& x)
@@ -44,7 +49,14 @@ class Reader {
 public:
   static constexpr bool kReads = true;
 
-  explicit Reader(std::string_view bytes) : bytes_(bytes) {}
+  explicit Reader(std::string_view bytes, std::uint32_t version = kVersion)
+  : bytes_(bytes), version_(version)
+  {}
+
+  std::uint32_t version() const
+  {
+    return version_;
+  }
 
   template <typename T>
   void value(T& x)
@@ -63,6 +75,7 @@ public:
 
 private:
   std::string_view bytes_;
+  std::uint32_t version_;
 };
 
 // The same functions write and read, so that neither can forget what the other has.
@@ -125,13 +138,22 @@ template <typename Archive>
 void
 pass(Archive& archive, JetFilter& filter)
 {
-  JetVector value = filter.value(), pattern = filter.patternValue();
-  Packed<12> joint = filter.joint();
-  pass(archive, value);
-  pass(archive, pattern);
-  pass(archive, joint.v);
-  if (Archive::kReads)
-    filter = JetFilter::restored(value, pattern, joint);
+  JetFilter::State state = filter.state();
+  pass(archive, state.value);
+  pass(archive, state.pattern);
+  // Before, what third derivatives do was in the joint covariance, in doubles.
+  constexpr std::uint32_t kFirstWithThird = 2;
+  if (archive.version() >= kFirstWithThird) {
+    pass(archive, state.joint.v);
+    pass(archive, state.by_third);
+    archive.value(state.s3_per_m2);
+  }
+  else {
+    Packed<12> joint;
+    pass(archive, joint.v);
+    state.joint = Packed<12, float>::of(joint.matrix());
+  }
+  filter = JetFilter(state);
 }
 
 template <typename Archive>
@@ -230,7 +252,7 @@ parsed(std::string_view bytes)
   std::memcpy(&sum, body.data() + body.size(), sizeof sum);
   if (sum != checksum(body))
     throw std::runtime_error("is cut short or damaged: its checksum is another one");
-  Reader reader(body.substr(sizeof version));
+  Reader reader(body.substr(sizeof version), version);
   std::string sensor;
   pass(reader, sensor);
   PatchMap::Snapshot snapshot;

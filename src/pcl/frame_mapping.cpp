@@ -264,7 +264,8 @@ FrameMapper::measure(const RangeCloud& frame,
   PatchSites sites;
   sites.first_seeds = std::move(places.seeds);
   sites.is_free = [&](const Seed& seed) {
-    return !map_.hasAnchorWithin(to_map.toWorld(seed.position), nearest);
+    const Eigen::Vector3d place = to_map.toWorld(seed.position);
+    return !map_.hasAnchorWithin(place, nearest) && !map_.isCovered(place);
   };
   std::mutex mutex;
   sites.observe =

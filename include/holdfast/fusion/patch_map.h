@@ -128,7 +128,9 @@ struct UpdateReport {
   int born = 0; ///< no patch was near
   int gated = 0; ///< refused by the gate of the patch near it
   int replaced = 0; ///< refused once too often: the patch is what was measured
-  int surplus = 0; ///< the patch near it had its measurement in this frame
+  /// The patch near it had its measurement in this frame, or it lies on the support of
+  /// one from a former frame (PatchMap::isCovered()).
+  int surplus = 0;
   int uncertain = 0; ///< PatchMapOptions::max_uncertainty_rad
   int unfit = 0; ///< not finite, or with a covariance that is none
   int seen_through = 0; ///< patches that were, of those named
@@ -226,6 +228,10 @@ public:
   /// at most options().radius_m.
   bool hasAnchorWithin(const Eigen::Vector3d& place, double distance_m) const;
 
+  /// True where a place of the map's frame lies on what a patch was seen of, no further
+  /// from its surface than the map associates: a patch there would rest on its points.
+  bool isCovered(const Eigen::Vector3d& place) const;
+
   /// How many updates there were.
   int frames() const
   {
@@ -263,6 +269,8 @@ private:
   void split(UpdateReport& report);
   void merge(UpdateReport& report);
   void forget(UpdateReport& report);
+  bool covers(const MapPatch& patch, const Eigen::Vector3d& place) const;
+  bool isOnFormer(const Pose& anchor) const;
   bool isFacingAs(const MapPatch& patch, const Pose& anchor) const;
   double reach() const;
   JetMatrix errorOf(const JetMatrix& covariance,
@@ -288,6 +296,7 @@ private:
   std::optional<JetMatrix> pose_covariance_; ///< of place(); none: robot-centric
   int frames_ = 0;
   std::uint64_t next_id_ = 1;
+  std::uint64_t first_of_frame_ = 1; ///< of the ids given in the last update
   std::vector<MapPatch> patches_;
   // Patches by cells of the map, in chains: the first of each bucket, the next of each
   // patch.
