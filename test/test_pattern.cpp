@@ -8,6 +8,7 @@
 #include "geometry/symmetric.h"
 #include "uncertainty/covariance.h"
 
+#include <holdfast/geometry/rotation.h>
 #include <holdfast/patch_estimator.h>
 #include <holdfast/uncertainty/monte_carlo.h>
 
@@ -520,7 +521,7 @@ TEST_P(PatternKernel, NeighborsAreAllInTheMiddleAndHalfAtTheEdge)
   kernel::Points points = kernelPoints(batch);
   points.pattern = &shared;
   PaddedRows rows;
-  rows.reset(1, batch.paddedSize());
+  rows.resize(1, batch.paddedSize());
   double* const out = rows.row(0);
   const kernel::NeighborVariance neighbors{{1.0, 2.0},
                                            {0.06, 0.02, 0.05},
@@ -545,13 +546,19 @@ TEST_P(PatternKernel, SumsOverCellsAreThoseOverAllPairsOfThem)
     Random random(static_cast<std::uint64_t>(count));
     const PointBatch batch = randomBatch(count, random);
     PaddedRows rows;
-    rows.reset(kernel::kMaxTheta, batch.paddedSize());
+    rows.resize(kernel::kMaxTheta, batch.paddedSize());
+    rows.setZero(0);
     double* const response = rows.row(0);
     kernel::PatternPoints shared = kernelPattern(batch);
     shared.response = response;
     kernel::Points points = kernelPoints(batch);
     points.pattern = &shared;
     const Eigen::Vector3d mean = random.normalVector();
+    const Eigen::Matrix3d R = expMap(random.normalVector());
+    kernel::MomentFrame frame;
+    Eigen::Map<Eigen::Matrix3d>(frame.R) = R.transpose(); // row-major
+    Eigen::Map<Eigen::Vector3d>(frame.mean) = mean;
+    frame.scale = 1.0 / count;
     // Some pixels lie outside.
     const kernel::CellGrid grid{{-12.0, -15.0}, 1.0 / 3.0};
     Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(kCells * kCells, kRow);
@@ -563,17 +570,21 @@ TEST_P(PatternKernel, SumsOverCellsAreThoseOverAllPairsOfThem)
       Eigen::RowVectorXd y = Eigen::RowVectorXd::Zero(kRow);
       for (int a = 0; a < kernel::kMaxTheta; ++a)
         y[a] = response[a * batch.paddedSize() + i] = random.normal();
-      const Eigen::Vector3d q = batch.point(i) - mean;
-      for (int b = 0; b < 3; ++b)
-        y[6 + b] = shared.direction[b][i];
+      const Eigen::Vector3d q = R.transpose() * (batch.point(i) - mean);
+      const Eigen::Vector3d r = R.transpose() *
+                                Eigen::Vector3d(shared.direction[0][i],
+                                                shared.direction[1][i],
+                                                shared.direction[2][i]) /
+                                count;
+      y.segment<3>(6) = r;
       for (int e = 0; e < symmetric::kSize; ++e) {
         const int b = symmetric::kRow[e], c = symmetric::kColumn[e];
-        y[9 + e] = q[b] * shared.direction[c][i] + q[c] * shared.direction[b][i];
+        y[9 + e] = q[b] * r[c] + q[c] * r[b];
       }
       expected.row(kCells * cell(1) + cell(0)) += y;
     }
     kernel::CellSums cells{};
-    GetParam()->sumInCells(points, mean.data(), grid, cells);
+    GetParam()->sumInCells(points, frame, grid, cells);
     for (int cell = 0; cell < kCells * kCells; ++cell)
       for (int k = 0; k < kRow; ++k)
         EXPECT_NEAR(cells.y[cell][k], expected(cell, k), count * kRounding);

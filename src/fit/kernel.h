@@ -204,6 +204,13 @@ struct CellGrid {
   double inverse_side;
 };
 
+/// What the moments of the points are taken in.
+struct MomentFrame {
+  double R[9]; ///< row-major, local to world
+  double mean[3]; ///< in the axes of the batch
+  double scale; ///< of r_i
+};
+
 /// Rows of as many numbers each, of small matrices whose size is known at run time.
 inline constexpr int kSmallRow = 16;
 
@@ -283,9 +290,9 @@ struct Kernel {
 
   /// Adds y_i of every point that shares errors to the cell it is in: its response,
   /// then r_i and the q_b r_c + q_c r_b of bc = xx xy xz yy yz zz, q from the mean, in
-  /// the axes of the batch.
+  /// the frame.
   void (*sumInCells)(const Points& points,
-                     const double mean[3],
+                     const MomentFrame& frame,
                      const CellGrid& grid,
                      CellSums& cells);
 

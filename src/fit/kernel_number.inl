@@ -39,4 +39,14 @@ storeByLane(const Number x[4], double* p)
   hn::StoreInterleaved4(x[0].v, x[1].v, x[2].v, x[3].v, kTag, p);
 }
 
+HWY_INLINE void
+addFour(const double* x, double* sum)
+{
+  constexpr hn::CappedTag<double, 4> kFour;
+  for (std::size_t i = 0; i < 4; i += hn::Lanes(kFour))
+    hn::Store(hn::Add(hn::Load(kFour, sum + i), hn::Load(kFour, x + i)),
+              kFour,
+              sum + i);
+}
+
 #include "kernel_operators.inl"

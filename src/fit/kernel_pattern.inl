@@ -74,19 +74,21 @@ cellAlong(Number pixel, double corner, double inverse_side)
 // y_i of kLanes points, four by four.
 HOLDFAST_INLINE void
 writeCellTerms(const Points& points,
-               const double mean[3],
+               const MomentFrame& frame,
                int i,
                double y[kCellRow / 4][4 * kLanes])
 {
   const PatternPoints& pattern = *points.pattern;
-  Number term[kCellRow], q[3];
+  Number term[kCellRow], offset[3], direction[3], q[3];
   HOLDFAST_UNROLLED_FOR (int a = 0; a < kMaxTheta; ++a)
     term[a] = load(pattern.response + a * points.padded_size + i);
   Number* r = term + kMaxTheta;
   HOLDFAST_UNROLLED_FOR (int k = 0; k < 3; ++k) {
-    q[k] = load(points.channel[k] + i) - mean[k];
-    r[k] = load(pattern.direction[k] + i);
+    offset[k] = load(points.channel[k] + i) - frame.mean[k];
+    direction[k] = load(pattern.direction[k] + i) * frame.scale;
   }
+  rotateIntoFrame(frame.R, offset, q);
+  rotateIntoFrame(frame.R, direction, r);
   Number* moment = r + 3;
   HOLDFAST_UNROLLED_FOR (int b = 0, entry = 0; b < 3; ++b)
     HOLDFAST_UNROLLED_FOR (int c = b; c < 3; ++c, ++entry)
@@ -98,22 +100,22 @@ writeCellTerms(const Points& points,
 
 inline void
 sumInCells(const Points& points,
-           const double mean[3],
+           const MomentFrame& frame,
            const CellGrid& grid,
            CellSums& cells)
 {
   const double* const* pixel = points.pattern->pixel;
   alignas(64) double y[kCellRow / 4][4 * kLanes], column[kLanes], row[kLanes];
   for (int i = 0; i < points.padded_size; i += kLanes) {
-    writeCellTerms(points, mean, i, y);
+    writeCellTerms(points, frame, i, y);
     store(cellAlong(load(pixel[0] + i), grid.corner[0], grid.inverse_side), column);
     store(cellAlong(load(pixel[1] + i), grid.corner[1], grid.inverse_side), row);
     for (int lane = 0; lane < kLanes; ++lane) {
       double* cell =
           cells
               .y[static_cast<int>(row[lane]) * kCells + static_cast<int>(column[lane])];
-      for (int k = 0; k < kCellRow; ++k)
-        cell[k] += y[k / 4][4 * lane + k % 4];
+      HOLDFAST_UNROLLED_FOR (int k = 0; k < kCellRow; k += 4)
+        addFour(y[k / 4] + 4 * lane, cell + k);
     }
   }
 }

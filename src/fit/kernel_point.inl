@@ -9,6 +9,8 @@
 //   store(Number, double*)    the reverse
 //   storeByLane(const Number x[4], double*)
 //                             the same of four, lane by lane
+//   addFour(const double*, double*)
+//                             to what is there, both aligned as four doubles are
 //   sumOfLanes(Number)        their sum
 //   sumsOfLanes(const Number*, double*)
 //                             those of kLanes Numbers

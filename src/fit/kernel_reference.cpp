@@ -38,6 +38,13 @@ storeByLane(const double x[4], double* p)
   std::copy_n(x, 4, p);
 }
 
+void
+addFour(const double* x, double* sum)
+{
+  for (int i = 0; i < 4; ++i)
+    sum[i] += x[i];
+}
+
 double
 sumOfLanes(double x)
 {

@@ -1,6 +1,5 @@
 #include "pattern.h"
 
-#include "geometry/symmetric.h"
 #include <holdfast/geometry/constants.h>
 
 #include "surface_fit.h"
@@ -77,36 +76,18 @@ withPattern(const PointBatch& batch, const kernel::PatternPoints& shared)
   return points;
 }
 
-// d[gradient | moments in the axes of R, over N] / d[gradient | sums of moments].
-PatternMatrix
-turnOfMoments(const Eigen::Matrix3d& R, int count)
+// What D_i is taken in: the axes of R, about the mean, over N.
+kernel::MomentFrame
+momentFrame(const Scatter& scatter, const Eigen::Matrix3d& R, int count)
 {
-  const double scale = 1.0 / count;
-  PatternMatrix turn = PatternMatrix::Identity();
-  turn.block<3, 3>(6, 6) = scale * R.transpose();
-  for (int e = 0; e < symmetric::kSize; ++e)
-    for (int o = 0; o < symmetric::kSize; ++o) {
-      const int i = symmetric::kRow[e], j = symmetric::kColumn[e];
-      const int b = symmetric::kRow[o], c = symmetric::kColumn[o];
-      turn(9 + e, 9 + o) =
-          scale * (R(b, i) * R(c, j) + (b == c ? 0.0 : R(c, i) * R(b, j)));
-    }
-  return turn;
-}
-
-// T Q T^T of a T that is the identity, then two blocks.
-PatternMatrix
-turned(const PatternMatrix& T, const PatternMatrix& Q)
-{
-  PatternMatrix half = Q, full;
-  half.middleRows<3>(6) = T.block<3, 3>(6, 6).lazyProduct(Q.middleRows<3>(6));
-  half.middleRows<6>(9) = T.block<6, 6>(9, 9).lazyProduct(Q.middleRows<6>(9));
-  full = half;
-  full.middleCols<3>(6) =
-      half.middleCols<3>(6).lazyProduct(T.block<3, 3>(6, 6).transpose());
-  full.middleCols<6>(9) =
-      half.middleCols<6>(9).lazyProduct(T.block<6, 6>(9, 9).transpose());
-  return full;
+  kernel::MomentFrame frame;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j)
+      frame.R[3 * i + j] = R(i, j);
+    frame.mean[i] = scatter.mean[i];
+  }
+  frame.scale = 1.0 / count;
+  return frame;
 }
 
 } // namespace
@@ -205,14 +186,13 @@ PatternSupport::sum(const PointBatch& batch,
   for (auto& cell : cells.y)
     std::fill(std::begin(cell), std::end(cell), 0.0);
   kernel::kernel().sumInCells(withPattern(batch, shared),
-                              scatter.mean.data(),
+                              momentFrame(scatter, R, batch.size()),
                               {{u0_, v0_}, 1.0 / side_px_},
                               cells);
   writeCovariance(*batch.pattern(), cells);
   alignas(64) Sum sum;
   kernel::kernel().sumOverCells(cells, sum.data());
-  return turned(turnOfMoments(R, batch.size()),
-                sum.topLeftCorner<kPatternTerms, kPatternTerms>());
+  return sum.topLeftCorner<kPatternTerms, kPatternTerms>();
 }
 
 } // namespace holdfast

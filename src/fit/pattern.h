@@ -18,6 +18,8 @@
 
 #include <Eigen/Core>
 
+#include <algorithm>
+#include <cstddef>
 #include <vector>
 
 namespace holdfast {
@@ -33,11 +35,19 @@ using PatternMatrix =
 /// uses.
 class PaddedRows {
 public:
-  /// Zero.
-  void reset(int rows, int padded_size)
+  /// What is written, zero or not, is left to the caller.
+  void resize(int rows, int padded_size)
   {
     lines_per_row_ = static_cast<std::size_t>(padded_size / PointBatch::kLaneMultiple);
-    lines_.assign(static_cast<std::size_t>(rows) * lines_per_row_, {});
+    lines_.resize(static_cast<std::size_t>(rows) * lines_per_row_);
+  }
+
+  void setZero(int first_row)
+  {
+    std::fill(lines_.begin() + static_cast<std::ptrdiff_t>(first_row) *
+                                   static_cast<std::ptrdiff_t>(lines_per_row_),
+              lines_.end(),
+              Line{});
   }
 
   double* row(int i)

@@ -278,7 +278,9 @@ public:
       return;
     // Kept between patches: no allocation once they have seen the largest.
     thread_local PaddedRows response;
-    response.reset(kernel::kMaxTheta, points_.padded_size);
+    response.resize(kernel::kMaxTheta, points_.padded_size);
+    response.setZero(
+        kernel::parameterCount(problem.model)); // the kernel fills the others
     pattern_ = kernelPattern(problem.batch);
     pattern_.response = response.row(0);
     points_.pattern = &pattern_;
@@ -386,7 +388,7 @@ double
 takenUpWithoutResiduals(const SurfaceProblem& problem, const UnboundedSurface& surface)
 {
   thread_local PaddedRows moved;
-  moved.reset(3, problem.points.padded_size);
+  moved.resize(3, problem.points.padded_size);
   double* const onto[3] = {moved.row(0), moved.row(1), moved.row(2)};
   moveOnto(surface, problem.points, onto);
   SurfaceProblem ideal = problem;
@@ -734,24 +736,22 @@ symmetricInverse(const ThetaMatrix& H)
 }
 
 ThetaMatrix
-patternOfGradient(const Linearization& l)
-{
-  Eigen::Matrix<double, kernel::kMaxTheta, kPatternTerms> J;
-  J << ThetaMatrix::Identity(), l.A;
-  return J.lazyProduct(l.pattern).eval().lazyProduct(J.transpose());
-}
-
-ThetaMatrix
 thetaCovariance(const Linearization& l, const ThetaMatrix& hessian)
 {
   // lazyProduct: for matrices this small Eigen's blocked product costs more than the
   // work.
-  const ThetaByMoments half = l.XD + 0.5 * l.A.lazyProduct(l.DD);
+  ThetaMatrix XX = l.XX;
+  ThetaByMoments XD = l.XD;
+  MomentMatrix DD = l.DD;
+  if (l.has_pattern) {
+    XX += l.pattern.topLeftCorner<kernel::kMaxTheta, kernel::kMaxTheta>();
+    XD += l.pattern.topRightCorner<kernel::kMaxTheta, kMoments>();
+    DD += l.pattern.bottomRightCorner<kMoments, kMoments>();
+  }
+  const ThetaByMoments half = XD + 0.5 * l.A.lazyProduct(DD);
   const ThetaMatrix cross = half.lazyProduct(l.A.transpose());
   const ThetaMatrix inverse = symmetricInverse(hessian);
-  ThetaMatrix gradient = l.XX + cross + cross.transpose();
-  if (l.has_pattern)
-    gradient += patternOfGradient(l);
+  const ThetaMatrix gradient = XX + cross + cross.transpose();
   return inverse.lazyProduct(ThetaMatrix(gradient.lazyProduct(inverse)));
 }
 

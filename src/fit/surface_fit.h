@@ -95,10 +95,6 @@ SurfaceFit fitSurface(kernel::Model model,
 /// Inverse of a positive definite matrix.
 ThetaMatrix symmetricInverse(const ThetaMatrix& H);
 
-/// What errors that points share add to the covariance of the gradient at the estimate,
-/// E_theta + A ds.
-ThetaMatrix patternOfGradient(const Linearization& linearization);
-
 /// First-order covariance of theta, from the Hessian or its Gauss-Newton part.
 ThetaMatrix thetaCovariance(const Linearization& linearization,
                             const ThetaMatrix& hessian);

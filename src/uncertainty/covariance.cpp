@@ -149,7 +149,8 @@ addPatternOfPlaneStage(const PatchFit& fit,
   thread_local PaddedRows response;
   for (int first = 0; first < terms.n; first += room) {
     const int rows = std::min(room, terms.n - first);
-    response.reset(kernel::kMaxTheta, padded);
+    response.resize(kernel::kMaxTheta, padded);
+    response.setZero(0);
     for (int i = 0; i < batch.size(); ++i) {
       const Eigen::Vector3d r = sharedDirection(batch, i);
       Eigen::Matrix<double, kernel::kMaxTheta, 1> y;
