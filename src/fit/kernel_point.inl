@@ -9,8 +9,11 @@
 //   store(Number, double*)    the reverse
 //   storeByLane(const Number x[4], double*)
 //                             the same of four, lane by lane
-//   addFour(const double*, double*)
-//                             to what is there, both aligned as four doubles are
+//   Scalar                    one of those in a Number, which load() and store() know,
+//   too addRow(const Scalar* y, int lane, Scalar* sum)
+//                             adds kCellRow numbers of a lane, which storeByLane() has
+//                             stored four by four
+//   roundedDown(Number)
 //   sumOfLanes(Number)        their sum
 //   sumsOfLanes(const Number*, double*)
 //                             those of kLanes Numbers
@@ -43,6 +46,35 @@ placeInFrame(const Surface& surface,
 }
 
 #include "kernel_evaluation.inl"
+
+HOLDFAST_INLINE Number
+smaller(Number a, Number b)
+{
+  return selectLess(a, b, a, b);
+}
+
+HOLDFAST_INLINE Number
+larger(Number a, Number b)
+{
+  return selectLess(a, b, b, a);
+}
+
+// The cells of points; pixels beyond all reason are in some cell, too.
+HOLDFAST_INLINE void
+findCells(const PatternPoints& pattern, int i, double* rows)
+{
+  const CellGrid& grid = pattern.grid;
+  const Number first(0.0), last(kCells - 1.0);
+  Number at[2];
+  HOLDFAST_UNROLLED_FOR (int k = 0; k < 2; ++k) {
+    const Number exact =
+        (load(pattern.pixel[k] + i) - grid.corner[k]) * grid.inverse_side;
+    at[k] = roundedDown(larger(first, smaller(exact, last)));
+  }
+  store((at[1] * kCells + at[0]) * kCellRow, rows);
+}
+
+#include "kernel_cells.inl"
 
 #include "kernel_cross.inl"
 
@@ -263,6 +295,7 @@ covarianceSums(const Points& points, const State& state, CovarianceSums& out)
   constexpr std::make_integer_sequence<int, p> rows;
   const Surface surface{state};
   CrossSums<p, shape> sums;
+  CellTotals cells(points);
   LTotals::Of<Number> of_L;
   setZero(sums);
   setZero(of_L);
@@ -283,8 +316,9 @@ covarianceSums(const Points& points, const State& state, CovarianceSums& out)
         tile.qt[i][k] = point.q[k] - state.centroid[k];
     }
     addHessian<ResidualPolicy>(surface, expanded, tile, sums, rows);
-    addCrossTerms(points, state, first, tile, sums, rows);
+    addCrossTerms(points, state, first, tile, cells, sums, rows);
   }
+  cells.finish();
   reduce(sums, out);
   reduceL(of_L, out);
   surface.combine(out.L, out.gradient);
@@ -438,12 +472,6 @@ residualsOfPoints(const Points& points, const State& state, double* out)
     const Number e = residual.first().e;
     store(e * e * residual.inverse, out + i);
   }
-}
-
-HOLDFAST_INLINE Number
-larger(Number a, Number b)
-{
-  return selectLess(a, b, b, a);
 }
 
 HOLDFAST_INLINE Number

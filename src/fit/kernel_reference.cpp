@@ -12,6 +12,7 @@ namespace holdfast { namespace kernel {
 namespace {
 
 using Number = double;
+using Scalar = double;
 constexpr int kLanes = 1;
 
 double
@@ -39,10 +40,16 @@ storeByLane(const double x[4], double* p)
 }
 
 void
-addFour(const double* x, double* sum)
+addRow(const double* y, int, double* sum)
 {
-  for (int i = 0; i < 4; ++i)
-    sum[i] += x[i];
+  for (int k = 0; k < kCellRow; ++k)
+    sum[k] += y[k];
+}
+
+double
+roundedDown(double x)
+{
+  return std::floor(x);
 }
 
 double
@@ -99,6 +106,12 @@ accumulateCovarianceIn(Precision,
                        CovarianceSums& sums)
 {
   accumulateCovariance(model, residual, points, state, sums);
+}
+
+void
+sumOverCellsIn(Precision, const CellSums& cells, double* out)
+{
+  sumOverCells(cells, out);
 }
 
 #include "kernel_table.inl"

@@ -65,6 +65,15 @@ accumulateCovarianceIn(Precision precision,
     accumulateCovariance(model, residual, points, state, sums);
 }
 
+void
+sumOverCellsIn(Precision precision, const CellSums& cells, double* out)
+{
+  if (precision == Precision::Single)
+    single::sumOverCells(cells, out);
+  else
+    sumOverCells(cells, out);
+}
+
 #include "kernel_table.inl"
 
 Kernel

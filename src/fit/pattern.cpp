@@ -49,23 +49,30 @@ constexpr double kEdgeInReaches = 6.0;
 class CellMeans {
 public:
   CellMeans(double length, double side)
+  : spread_(length * length + side * side / 6.0)
+  , side_(side)
+  , within_(length / std::sqrt(spread_))
+  {}
+
+  /// In one and the same interval.
+  double within() const
   {
-    const double spread = length * length + side * side / 6.0;
-    mean_ = length / std::sqrt(spread);
-    ratio_ = std::exp(-0.5 * side * side / spread);
-    change_ = ratio_ * ratio_;
+    return within_;
   }
 
-  double next()
+  void write(double means[kCells]) const
   {
-    const double mean = mean_;
-    mean_ *= ratio_; // exponents go by squares: 0, 1, 4, 9
-    ratio_ *= change_;
-    return mean;
+    double mean = within_, ratio = std::exp(-0.5 * side_ * side_ / spread_);
+    const double change = ratio * ratio;
+    for (int apart = 0; apart < kCells; ++apart) {
+      means[apart] = mean;
+      mean *= ratio; // exponents go by squares: 0, 1, 4, 9
+      ratio *= change;
+    }
   }
 
 private:
-  double mean_, ratio_, change_;
+  double spread_, side_, within_;
 };
 
 kernel::Points
@@ -74,20 +81,6 @@ withPattern(const PointBatch& batch, const kernel::PatternPoints& shared)
   kernel::Points points = kernelPoints(batch);
   points.pattern = &shared;
   return points;
-}
-
-// What D_i is taken in: the axes of R, about the mean, over N.
-kernel::MomentFrame
-momentFrame(const Scatter& scatter, const Eigen::Matrix3d& R, int count)
-{
-  kernel::MomentFrame frame;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j)
-      frame.R[3 * i + j] = R(i, j);
-    frame.mean[i] = scatter.mean[i];
-  }
-  frame.scale = 1.0 / count;
-  return frame;
 }
 
 } // namespace
@@ -141,7 +134,7 @@ PatternSupport::writeExtra(const kernel::Points& points, PointBatch& batch) cons
     else {
       // The sum over pairs of cells holds every point with itself, as if it were
       // anywhere in the cell.
-      const double mean = CellMeans(wave.length_px, side_px_).next();
+      const double mean = CellMeans(wave.length_px, side_px_).within();
       within_cell += wave.variance * mean * mean;
     }
   }
@@ -159,39 +152,36 @@ void
 PatternSupport::writeCovariance(const CorrelatedNoise& noise,
                                 kernel::CellSums& cells) const
 {
-  for (auto& row : cells.covariance)
-    std::fill(std::begin(row), std::end(row), 0.0);
-  for (const CorrelatedNoise::Component& wave : noise.components()) {
-    if (isShort(wave))
-      continue;
-    double along[kCells];
-    CellMeans means(wave.length_px, side_px_);
-    for (double& mean : along)
-      mean = means.next();
-    for (int down = 0; down < kCells; ++down)
+  struct Wave {
+    double variance, means[kCells];
+  };
+  // Kept between patches: no allocation once they have seen the most.
+  thread_local std::vector<Wave> waves;
+  waves.clear();
+  for (const CorrelatedNoise::Component& wave : noise.components())
+    if (!isShort(wave)) {
+      waves.push_back({wave.variance, {}});
+      CellMeans(wave.length_px, side_px_).write(waves.back().means);
+    }
+  for (int down = 0; down < kCells; ++down) {
+    double sum[kCells] = {};
+    for (const Wave& wave : waves) {
+      const double along = wave.variance * wave.means[down];
       for (int across = 0; across < kCells; ++across)
-        cells.covariance[down][across] += wave.variance * along[down] * along[across];
+        sum[across] += along * wave.means[across];
+    }
+    std::copy_n(sum, kCells, cells.covariance[down]);
   }
 }
 
 PatternMatrix
-PatternSupport::sum(const PointBatch& batch,
-                    const Scatter& scatter,
-                    const Eigen::Matrix3d& R,
-                    double* response) const
+PatternSupport::sum(const CorrelatedNoise& noise,
+                    kernel::Precision precision,
+                    kernel::CellSums& cells) const
 {
-  kernel::PatternPoints shared = kernelPattern(batch);
-  shared.response = response;
-  kernel::CellSums cells;
-  for (auto& cell : cells.y)
-    std::fill(std::begin(cell), std::end(cell), 0.0);
-  kernel::kernel().sumInCells(withPattern(batch, shared),
-                              momentFrame(scatter, R, batch.size()),
-                              {{u0_, v0_}, 1.0 / side_px_},
-                              cells);
-  writeCovariance(*batch.pattern(), cells);
+  writeCovariance(noise, cells);
   alignas(64) Sum sum;
-  kernel::kernel().sumOverCells(cells, sum.data());
+  kernel::kernel().sumOverCells(precision, cells, sum.data());
   return sum.topLeftCorner<kPatternTerms, kPatternTerms>();
 }
 

@@ -24,8 +24,6 @@
 
 namespace holdfast {
 
-struct Scatter;
-
 /// y of a cell: X_i r_i (6), D_i r_i for mean (3) and scatter xx xy xz yy yz zz (6).
 inline constexpr int kPatternTerms = kernel::kMaxTheta + 9;
 using PatternMatrix =
@@ -40,14 +38,6 @@ public:
   {
     lines_per_row_ = static_cast<std::size_t>(padded_size / PointBatch::kLaneMultiple);
     lines_.resize(static_cast<std::size_t>(rows) * lines_per_row_);
-  }
-
-  void setZero(int first_row)
-  {
-    std::fill(lines_.begin() + static_cast<std::ptrdiff_t>(first_row) *
-                                   static_cast<std::ptrdiff_t>(lines_per_row_),
-              lines_.end(),
-              Line{});
   }
 
   double* row(int i)
@@ -72,13 +62,29 @@ public:
   /// EXTRA.
   explicit PatternSupport(PointBatch& batch);
 
-  /// The pattern's share in the gradient's and the moments' covariance, axes of the
-  /// frame R; what EXTRA stands for not included.
-  /// \param response X_i r_i as from the kernel.
-  PatternMatrix sum(const PointBatch& batch,
-                    const Scatter& scatter,
-                    const Eigen::Matrix3d& R,
-                    double* response) const;
+  /// The cells over the points.
+  kernel::CellGrid grid() const
+  {
+    return {{u0_, v0_}, 1.0 / side_px_};
+  }
+
+  /// In which of them a pixel lies.
+  int cellOf(double u, double v) const
+  {
+    const kernel::CellGrid cells = grid();
+    const auto along = [&](double from_corner) {
+      const double sides = from_corner * cells.inverse_side;
+      return static_cast<int>(std::clamp(sides, 0.0, kernel::kCells - 1.0));
+    };
+    return kernel::kCells * along(v - v0_) + along(u - u0_);
+  }
+
+  /// The pattern's share in the gradient's and the moments' covariance, what EXTRA
+  /// stands for not included.
+  /// \param cells sums of y_i, of which the covariance is added.
+  PatternMatrix sum(const CorrelatedNoise& noise,
+                    kernel::Precision precision,
+                    kernel::CellSums& cells) const;
 
 private:
   bool isShort(const CorrelatedNoise::Component& wave) const;

@@ -276,13 +276,9 @@ public:
     const CorrelatedNoise* shared = problem.batch.pattern();
     if (shared == nullptr || shared->variance() == 0.0)
       return;
-    // Kept between patches: no allocation once they have seen the largest.
-    thread_local PaddedRows response;
-    response.resize(kernel::kMaxTheta, points_.padded_size);
-    response.setZero(
-        kernel::parameterCount(problem.model)); // the kernel fills the others
     pattern_ = kernelPattern(problem.batch);
-    pattern_.response = response.row(0);
+    pattern_.grid = problem.support.grid();
+    pattern_.cells = &cells_;
     points_.pattern = &pattern_;
   }
 
@@ -318,6 +314,7 @@ public:
         lanes);
     kernel::PatternPoints pattern = pattern_;
     pattern.extra = less.front().value;
+    pattern.cells = nullptr;
     kernel::Points points = points_;
     points.pattern = &pattern;
     accumulate(points, surface, sums);
@@ -325,15 +322,13 @@ public:
     return result;
   }
 
-  // After the last run, at the same surface.
-  void addPattern(const UnboundedSurface& surface, Linearization& linearization) const
+  // After the last run.
+  void addPattern(Linearization& linearization)
   {
     linearization.has_pattern = points_.pattern != nullptr;
     if (linearization.has_pattern)
-      linearization.pattern = problem_.support.sum(problem_.batch,
-                                                   problem_.scatter,
-                                                   surface.R,
-                                                   pattern_.response);
+      linearization.pattern =
+          problem_.support.sum(*problem_.batch.pattern(), problem_.precision, cells_);
   }
 
 private:
@@ -352,6 +347,7 @@ private:
   const SurfaceProblem& problem_;
   kernel::Points points_;
   kernel::PatternPoints pattern_{};
+  kernel::CellSums cells_; // where there is a pattern
 };
 
 // tr(H^-1 Cov(E_theta)): how much of chi2 the surface takes up on average.
@@ -394,12 +390,12 @@ takenUpWithoutResiduals(const SurfaceProblem& problem, const UnboundedSurface& s
   SurfaceProblem ideal = problem;
   ideal.precision = Precision::Double; // what residuals do not determine is not much
   std::copy_n(onto, 3, ideal.points.channel);
-  const CovariancePass pass(ideal);
+  CovariancePass pass(ideal);
   kernel::CovarianceSums sums;
   Linearization linearization;
   pass.run(surface, sums);
   linearize(surface, problem.scatter, sums, linearization);
-  pass.addPattern(surface, linearization);
+  pass.addPattern(linearization);
   return takenUp(linearization, symmetricInverse(linearization.H));
 }
 
@@ -438,7 +434,7 @@ polish(const SurfaceProblem& problem, const FitOptions& options, SurfaceFit& fit
   constexpr double kClimb = 0.25;
   const UnboundedSurface start = fit.surface;
   const double start_cost = fit.cost;
-  const CovariancePass pass(problem);
+  CovariancePass pass(problem);
   kernel::CovarianceSums sums;
   for (fit.polish_steps = 1; fit.polish_steps <= kMaxPolishSteps; ++fit.polish_steps) {
     pass.run(fit.surface, sums);
@@ -462,7 +458,7 @@ polish(const SurfaceProblem& problem, const FitOptions& options, SurfaceFit& fit
     const bool arrived =
         std::sqrt(std::max(0.0, -step.dot(gradient))) < options.polish_tolerance_sigma;
     if (arrived)
-      pass.addPattern(fit.surface, fit.linearization);
+      pass.addPattern(fit.linearization);
     if (arrived && options.separate_pattern)
       fit.white = pass.white(fit.surface);
     if (arrived && fit.linearization.has_pattern)
@@ -622,6 +618,8 @@ kernelPattern(const PointBatch& batch)
            batch.channel(PointBatch::EY),
            batch.channel(PointBatch::EZ)},
           batch.channel(PointBatch::EXTRA),
+          {},
+          1.0 / batch.size(),
           nullptr};
 }
 

@@ -102,7 +102,7 @@ ThetaMatrix thetaCovariance(const Linearization& linearization,
 /// The batch as the kernel sees it.
 kernel::Points kernelPoints(const PointBatch& batch);
 
-/// What its points share errors by, without responses.
+/// What its points share errors by, without cells.
 kernel::PatternPoints kernelPattern(const PointBatch& batch);
 
 /// The surface as the kernel sees it.
