@@ -23,6 +23,7 @@
 //   HOLDFAST_INLINE           before functions of the hot loop
 //   HOLDFAST_UNROLLED_FOR     `for` of constant length, whose arrays then live in
 //                             registers
+//   HOLDFAST_ROLLED_FOR       the reverse
 //
 // The notation is that of fit/kernel.h.
 

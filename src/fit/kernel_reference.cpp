@@ -7,6 +7,7 @@
 
 #define HOLDFAST_INLINE inline
 #define HOLDFAST_UNROLLED_FOR(...) for (__VA_ARGS__)
+#define HOLDFAST_ROLLED_FOR(...) for (__VA_ARGS__)
 
 namespace holdfast { namespace kernel {
 namespace {

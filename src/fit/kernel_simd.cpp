@@ -17,6 +17,7 @@
 
 #define HOLDFAST_INLINE HWY_INLINE
 #define HOLDFAST_UNROLLED_FOR(...) _Pragma("GCC unroll 32") for (__VA_ARGS__)
+#define HOLDFAST_ROLLED_FOR(...) _Pragma("GCC unroll 1") for (__VA_ARGS__)
 
 HWY_BEFORE_NAMESPACE();
 namespace holdfast { namespace kernel { namespace HWY_NAMESPACE {

@@ -16,7 +16,7 @@ namespace holdfast {
 namespace {
 
 using kernel::kCells, kernel::kCellRow;
-using Sum = Eigen::Matrix<double, kCellRow, kCellRow, Eigen::RowMajor>;
+using Sum = Eigen::Matrix<double, kCellRow, kCellRow>; // symmetric
 
 // A wave shorter than this many sides of a cell changes too much within one.
 constexpr double kShortWaveInCells = 0.5;
@@ -157,12 +157,15 @@ PatternSupport::writeCovariance(const CorrelatedNoise& noise,
   };
   // Kept between patches: no allocation once they have seen the most.
   thread_local std::vector<Wave> waves;
-  waves.clear();
-  for (const CorrelatedNoise::Component& wave : noise.components())
-    if (!isShort(wave)) {
-      waves.push_back({wave.variance, {}});
-      CellMeans(wave.length_px, side_px_).write(waves.back().means);
+  waves.resize(noise.components().size());
+  std::size_t count = 0;
+  for (const CorrelatedNoise::Component& component : noise.components())
+    if (!isShort(component)) {
+      Wave& wave = waves[count++];
+      wave.variance = component.variance;
+      CellMeans(component.length_px, side_px_).write(wave.means);
     }
+  waves.resize(count);
   for (int down = 0; down < kCells; ++down) {
     double sum[kCells] = {};
     for (const Wave& wave : waves) {

@@ -733,23 +733,35 @@ symmetricInverse(const ThetaMatrix& H)
   return SmallCholesky<kernel::kMaxTheta>(H).inverse();
 }
 
+namespace {
+
+// Of E_theta + A ds. lazyProduct: for matrices this small Eigen's blocked product costs
+// more than the work.
+ThetaMatrix
+gradientCovariance(const ThetaMatrix& XX,
+                   const ThetaByMoments& XD,
+                   const MomentMatrix& DD,
+                   const ThetaByMoments& A)
+{
+  const ThetaByMoments half = XD + 0.5 * A.lazyProduct(DD);
+  const ThetaMatrix cross = half.lazyProduct(A.transpose());
+  return XX + cross + cross.transpose();
+}
+
+} // namespace
+
 ThetaMatrix
 thetaCovariance(const Linearization& l, const ThetaMatrix& hessian)
 {
-  // lazyProduct: for matrices this small Eigen's blocked product costs more than the
-  // work.
-  ThetaMatrix XX = l.XX;
-  ThetaByMoments XD = l.XD;
-  MomentMatrix DD = l.DD;
-  if (l.has_pattern) {
-    XX += l.pattern.topLeftCorner<kernel::kMaxTheta, kernel::kMaxTheta>();
-    XD += l.pattern.topRightCorner<kernel::kMaxTheta, kMoments>();
-    DD += l.pattern.bottomRightCorner<kMoments, kMoments>();
-  }
-  const ThetaByMoments half = XD + 0.5 * l.A.lazyProduct(DD);
-  const ThetaMatrix cross = half.lazyProduct(l.A.transpose());
+  constexpr int p = kernel::kMaxTheta;
+  const ThetaMatrix gradient =
+      l.has_pattern ?
+          gradientCovariance(l.XX + l.pattern.topLeftCorner<p, p>(),
+                             l.XD + l.pattern.topRightCorner<p, kMoments>(),
+                             l.DD + l.pattern.bottomRightCorner<kMoments, kMoments>(),
+                             l.A) :
+          gradientCovariance(l.XX, l.XD, l.DD, l.A);
   const ThetaMatrix inverse = symmetricInverse(hessian);
-  const ThetaMatrix gradient = XX + cross + cross.transpose();
   return inverse.lazyProduct(ThetaMatrix(gradient.lazyProduct(inverse)));
 }
 

@@ -69,7 +69,9 @@ StereoNoiseModel::patternDirections(int n,
                                     double* const direction[3]) const
 {
   const double per_z = -1.0 / (parameters_.focal_px * parameters_.baseline_m);
-  const double *x = point[0], *y = point[1], *z = point[2];
+  const double* __restrict x = point[0];
+  const double* __restrict y = point[1];
+  const double* __restrict z = point[2];
   double* __restrict rx = direction[0];
   double* __restrict ry = direction[1];
   double* __restrict rz = direction[2];

@@ -262,10 +262,10 @@ noiseOf(const Linearization& l)
     for (int i = 0; i < kMoments; ++i)
       C(kTheta + i, kTheta + j) = l.DD(i, j);
   }
-  // What errors that points share add.
-  for (int j = 0; l.has_pattern && j < kPatternTerms; ++j)
-    for (int i = 0; i < kPatternTerms; ++i)
-      C(i, j) += l.pattern(i, j);
+  // What errors that points share add; symmetric, so that both go along what is stored.
+  for (int i = 0; l.has_pattern && i < kPatternTerms; ++i)
+    for (int j = 0; j < kPatternTerms; ++j)
+      C(i, j) += l.pattern(j, i);
   return C;
 }
 
@@ -419,12 +419,12 @@ isPositiveSemiDefiniteByPivots(const StateMatrix& S)
       pivot -= L[j][k] * L[j][k];
     if (!(pivot > 0.0))
       return false;
-    L[j][j] = std::sqrt(pivot);
+    const double inverse = 1.0 / std::sqrt(pivot);
     for (int i = j + 1; i < n; ++i) {
       double entry = S(i, j) * scale[i] * scale[j];
       for (int k = 0; k < j; ++k)
         entry -= L[i][k] * L[j][k];
-      L[i][j] = entry / L[j][j];
+      L[i][j] = entry * inverse;
     }
   }
   return true;
