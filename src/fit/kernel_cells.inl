@@ -17,12 +17,12 @@ public:
       std::fill_n(y_[0], kCells * kCells * kCellRow, Scalar(0.0));
   }
 
-  // Of kLanes points.
+  // Of kLanes points. Not inlined: the sums of the pass would lose registers to it.
   template <int p>
-  HOLDFAST_INLINE void add(int i,
-                           const Number response[p],
-                           const Number qt[3],
-                           const Number r[3])
+  HOLDFAST_NOINLINE void add(int i,
+                             const Number response[p],
+                             const Number qt[3],
+                             const Number r[3])
   {
     if (pattern_ == nullptr)
       return;

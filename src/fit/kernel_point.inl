@@ -21,6 +21,7 @@
 //   selectLess(a, b, x, y)    a < b ? x : y, lane by lane
 //   allLess(a, b)             a < b in every lane
 //   HOLDFAST_INLINE           before functions of the hot loop
+//   HOLDFAST_NOINLINE         before those that are to be called
 //   HOLDFAST_UNROLLED_FOR     `for` of constant length, whose arrays then live in
 //                             registers
 //   HOLDFAST_ROLLED_FOR       the reverse

@@ -6,6 +6,7 @@
 #include <utility>
 
 #define HOLDFAST_INLINE inline
+#define HOLDFAST_NOINLINE
 #define HOLDFAST_UNROLLED_FOR(...) for (__VA_ARGS__)
 #define HOLDFAST_ROLLED_FOR(...) for (__VA_ARGS__)
 

@@ -16,6 +16,7 @@
 #include <hwy/highway.h>
 
 #define HOLDFAST_INLINE HWY_INLINE
+#define HOLDFAST_NOINLINE HWY_NOINLINE
 #define HOLDFAST_UNROLLED_FOR(...) _Pragma("GCC unroll 32") for (__VA_ARGS__)
 #define HOLDFAST_ROLLED_FOR(...) _Pragma("GCC unroll 1") for (__VA_ARGS__)
 
