@@ -5,6 +5,7 @@
 
 #include "fit/fit_patch.h"
 #include "fit/pattern.h"
+#include "fit/surface_fit.h"
 #include "geometry/symmetric.h"
 #include "uncertainty/covariance.h"
 
@@ -520,7 +521,7 @@ TEST_P(PatternKernel, NeighborsAreAllInTheMiddleAndHalfAtTheEdge)
   kernel::Points points = kernelPoints(batch);
   points.pattern = &shared;
   PaddedRows rows;
-  rows.reset(1, batch.paddedSize());
+  rows.resize(1, batch.paddedSize());
   double* const out = rows.row(0);
   const kernel::NeighborVariance neighbors{{1.0, 2.0},
                                            {0.06, 0.02, 0.05},
@@ -538,61 +539,112 @@ TEST_P(PatternKernel, NeighborsAreAllInTheMiddleAndHalfAtTheEdge)
   }
 }
 
+// y_i of the points, by cells, from the X_i of every point.
+Eigen::MatrixXd
+expectedCells(const PointBatch& batch,
+              const kernel::Points& points,
+              const kernel::State& state,
+              Residual residual)
+{
+  constexpr int kModel = kernel::kMaxTheta;
+  const kernel::PatternPoints& shared = *points.pattern;
+  std::vector<double> X;
+  kernel::crossTerms(kernel::Model::Paraboloid, residual, points, state, X);
+  const Eigen::Matrix3d R = Eigen::Map<const Eigen::Matrix3d>(state.R).transpose();
+  const Eigen::Map<const Eigen::Vector3d> c(state.c), centroid(state.centroid);
+  Eigen::MatrixXd cells =
+      Eigen::MatrixXd::Zero(kernel::kCells * kernel::kCells, kernel::kCellRow);
+  for (int i = 0; i < batch.size(); ++i) {
+    const auto cell = [&](int k) {
+      const double at =
+          (shared.pixel[k][i] - shared.grid.corner[k]) * shared.grid.inverse_side;
+      return std::clamp(static_cast<int>(std::floor(at)), 0, kernel::kCells - 1);
+    };
+    const Eigen::Vector3d r = R.transpose() * Eigen::Vector3d(shared.direction[0][i],
+                                                              shared.direction[1][i],
+                                                              shared.direction[2][i]);
+    const Eigen::Vector3d q =
+        R.transpose() * (batch.point(i) - batch.origin() - c) - centroid;
+    Eigen::Matrix<double, kernel::kCellRow, 1> y;
+    y.setZero();
+    for (int a = 0; a < kModel; ++a)
+      y[a] = Eigen::Map<const Eigen::Vector3d>(&X[3 * (kModel * i + a)]).dot(r);
+    y.segment<3>(6) = r / batch.size();
+    for (int e = 0; e < symmetric::kSize; ++e) {
+      const int b = symmetric::kRow[e], d = symmetric::kColumn[e];
+      y[9 + e] = (q[b] * r[d] + q[d] * r[b]) / batch.size();
+    }
+    cells.row(kernel::kCells * cell(1) + cell(0)) += y.transpose();
+  }
+  return cells;
+}
+
+// By the feet of the rays and by the chain rule, in single precision and in double.
+TEST_P(PatternKernel, CovariancePassSumsResponsesAndMomentsInCells)
+{
+  for (const Residual residual : {Residual::Ray, Residual::Sampson})
+    for (const auto precision : {kernel::Precision::Single, kernel::Precision::Double})
+      for (const double radius_px : {3.0, 11.0}) {
+        PointBatch batch = disc(radius_px, 1, 0.5, 0.4, kinectPattern());
+        batch.pad();
+        const Scatter scatter = measureScatter(batch, false, -batch.origin());
+        UnboundedSurface surface;
+        surface.model = kernel::Model::Paraboloid;
+        surface.R = scatter.axes;
+        surface.c = scatter.mean;
+        surface.k << 0.3, 0.0, 0.6;
+        const kernel::State state = kernelState(surface, scatter);
+        kernel::CellSums cells;
+        kernel::PatternPoints shared = kernelPattern(batch);
+        // Some pixels lie outside.
+        shared.grid = {{shared.pixel[0][0] - 1.0, shared.pixel[1][0] + 1.0}, 0.7};
+        shared.cells = &cells;
+        kernel::Points points = kernelPoints(batch);
+        points.pattern = &shared;
+        kernel::CovarianceSums sums;
+        GetParam()->accumulateCovariance(precision,
+                                         kernel::Model::Paraboloid,
+                                         residual,
+                                         points,
+                                         state,
+                                         sums);
+        const Eigen::MatrixXd expected = expectedCells(batch, points, state, residual);
+        const double rounding = precision == kernel::Precision::Single ? 1e-5 : 1e-12;
+        for (int k = 0; k < kernel::kCellRow; ++k) {
+          const double largest = expected.col(k).cwiseAbs().maxCoeff();
+          for (int cell = 0; cell < expected.rows(); ++cell)
+            EXPECT_NEAR(cells.y[cell][k], expected(cell, k), rounding * largest)
+                << cell << " " << k;
+        }
+      }
+}
+
 TEST_P(PatternKernel, SumsOverCellsAreThoseOverAllPairsOfThem)
 {
   constexpr int kCells = kernel::kCells, kRow = kernel::kCellRow;
-  for (int count = 1; count <= 2 * PointBatch::kLaneMultiple + 1; count += 4) {
-    Random random(static_cast<std::uint64_t>(count));
-    const PointBatch batch = randomBatch(count, random);
-    PaddedRows rows;
-    rows.reset(kernel::kMaxTheta, batch.paddedSize());
-    double* const response = rows.row(0);
-    kernel::PatternPoints shared = kernelPattern(batch);
-    shared.response = response;
-    kernel::Points points = kernelPoints(batch);
-    points.pattern = &shared;
-    const Eigen::Vector3d mean = random.normalVector();
-    // Some pixels lie outside.
-    const kernel::CellGrid grid{{-12.0, -15.0}, 1.0 / 3.0};
-    Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(kCells * kCells, kRow);
-    for (int i = 0; i < count; ++i) {
-      const auto cell = [&](int k) {
-        const double at = (shared.pixel[k][i] - grid.corner[k]) * grid.inverse_side;
-        return std::clamp(static_cast<int>(std::floor(at)), 0, kCells - 1);
-      };
-      Eigen::RowVectorXd y = Eigen::RowVectorXd::Zero(kRow);
-      for (int a = 0; a < kernel::kMaxTheta; ++a)
-        y[a] = response[a * batch.paddedSize() + i] = random.normal();
-      const Eigen::Vector3d q = batch.point(i) - mean;
-      for (int b = 0; b < 3; ++b)
-        y[6 + b] = shared.direction[b][i];
-      for (int e = 0; e < symmetric::kSize; ++e) {
-        const int b = symmetric::kRow[e], c = symmetric::kColumn[e];
-        y[9 + e] = q[b] * shared.direction[c][i] + q[c] * shared.direction[b][i];
-      }
-      expected.row(kCells * cell(1) + cell(0)) += y;
-    }
-    kernel::CellSums cells{};
-    GetParam()->sumInCells(points, mean.data(), grid, cells);
+  for (const auto precision : {kernel::Precision::Single, kernel::Precision::Double}) {
+    Random random;
+    kernel::CellSums cells;
+    Eigen::MatrixXd y(kCells * kCells, kRow), C(kCells * kCells, kCells * kCells);
     for (int cell = 0; cell < kCells * kCells; ++cell)
       for (int k = 0; k < kRow; ++k)
-        EXPECT_NEAR(cells.y[cell][k], expected(cell, k), count * kRounding);
-
-    Eigen::MatrixXd C(kCells * kCells, kCells * kCells);
-    for (int down = 0; down < kCells; ++down)
-      for (int across = 0; across < kCells; ++across)
-        cells.covariance[down][across] = random.uniform(0.0, 1.0);
+        cells.y[cell][k] = y(cell, k) = random.normal();
+    for (auto& row : cells.covariance)
+      for (double& entry : row)
+        entry = random.uniform(0.0, 1.0);
     for (int a = 0; a < C.rows(); ++a)
       for (int b = 0; b < C.cols(); ++b)
         C(a, b) = cells.covariance[std::abs(a / kCells - b / kCells)]
                                   [std::abs(a % kCells - b % kCells)];
     alignas(64) double sum[kRow][kRow];
-    GetParam()->sumOverCells(cells, sum[0]);
-    const Eigen::MatrixXd pairs = expected.transpose() * C * expected;
+    GetParam()->sumOverCells(precision, cells, sum[0]);
+    const Eigen::MatrixXd pairs = y.transpose() * C * y;
+    // Of sums of 64 terms, each within half a unit in the last place.
+    const double rounding = precision == kernel::Precision::Single ? 1e-6 : 1e-13;
     const double largest = pairs.cwiseAbs().maxCoeff();
     for (int a = 0; a < kRow; ++a)
       for (int b = 0; b < kRow; ++b)
-        EXPECT_NEAR(sum[a][b], pairs(a, b), 1e-13 * largest);
+        EXPECT_NEAR(sum[a][b], pairs(a, b), rounding * largest);
   }
 }
 

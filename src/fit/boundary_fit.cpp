@@ -56,7 +56,7 @@ stateFrame(const Eigen::Matrix3d& axes,
 PlaneMatrix
 turnedMap(const PlaneMatrix& map, const Eigen::Matrix3d& V)
 {
-  const Eigen::Matrix3d T = symmetric::planeTurn(std::atan2(V(0, 1), V(0, 0)));
+  const Eigen::Matrix3d T = symmetric::planeTurn(V(0, 0), V(0, 1));
   const Eigen::Vector3d entries = T * map.entries();
   Rows3 rows;
   rows << map.dxx, map.dxy, map.dyy;
@@ -93,7 +93,7 @@ axesOfPatch(const BoundRequest& request, const SurfacePlacement& placed)
   }
   else {
     const Eigen::Matrix3d W = frame.transpose() * placed.R;
-    state.curvature = symmetric::planeTurn(std::atan2(W(0, 1), W(0, 0))) *
+    state.curvature = symmetric::planeTurn(W(0, 0), W(0, 1)) *
                       (curvatureShares(request.surface) * request.surface.k);
   }
   return axesOf(state).R;

@@ -71,12 +71,32 @@ packed(int row, int column, int n)
   return row * n - row * (row - 1) / 2 + column - row;
 }
 
+/// A square grid of cells, row by row, with kCellRow numbers each.
+inline constexpr int kCells = 8; ///< along a side; even
+inline constexpr int kCellRow = 16; ///< a multiple of every vector
+struct CellSums {
+  alignas(64) double y[kCells * kCells][kCellRow];
+  /// Of two cells, by how many rows and columns they are apart.
+  double covariance[kCells][kCells];
+};
+
+/// Where in the image the cells are.
+struct CellGrid {
+  double corner[2];
+  double inverse_side;
+};
+
 /// Points that share errors (fit/pattern.h).
 struct PatternPoints {
   const double* pixel[2]; ///< u, v
   const double* direction[3]; ///< r_i, how point i moves with its shared error
   const double* extra; ///< variance along r_i that the sums count beside Sigma_i
-  double* response; ///< X_i r_i, kMaxTheta rows of padded_size, of the covariance pass
+  CellGrid grid;
+  double per_count; ///< 1/N
+  /// Where the covariance pass sums y_i of the points, cell by cell: X_i r_i
+  /// (kMaxTheta), then r_i/N and the (qt_b r_c + qt_c r_b)/N of bc = xx xy xz yy yz zz,
+  /// in the local frame; null: it does not.
+  CellSums* cells;
 };
 
 /// Where the points are: channels in the order of PointBatch::Channel.
@@ -189,21 +209,6 @@ struct NeighborVariance {
   double edge; ///< how far inwards neighbours are missed, in radii of the disc
 };
 
-/// A square grid of cells, row by row, with kCellRow numbers each.
-inline constexpr int kCells = 8; ///< along a side; even
-inline constexpr int kCellRow = 16; ///< a multiple of every vector
-struct CellSums {
-  alignas(64) double y[kCells * kCells][kCellRow];
-  /// Of two cells, by how many rows and columns they are apart.
-  double covariance[kCells][kCells];
-};
-
-/// Where in the image the cells are.
-struct CellGrid {
-  double corner[2];
-  double inverse_side;
-};
-
 /// Rows of as many numbers each, of small matrices whose size is known at run time.
 inline constexpr int kSmallRow = 16;
 
@@ -281,18 +286,10 @@ struct Kernel {
                             const NeighborVariance& neighbors,
                             double* out);
 
-  /// Adds y_i of every point that shares errors to the cell it is in: its response,
-  /// then r_i and the q_b r_c + q_c r_b of bc = xx xy xz yy yz zz, q from the mean, in
-  /// the axes of the batch.
-  void (*sumInCells)(const Points& points,
-                     const double mean[3],
-                     const CellGrid& grid,
-                     CellSums& cells);
-
   /// sum_bb' y_b C(b - b') y_b'^T over the cells of a grid, whose covariance depends on
   /// their distance in rows and columns alone.
   /// \param out kCellRow rows of as many.
-  void (*sumOverCells)(const CellSums& cells, double* out);
+  void (*sumOverCells)(Precision precision, const CellSums& cells, double* out);
 
   /// J S J^T of n rows of J and a symmetric S of m, all in rows of kSmallRow, aligned,
   /// zero behind their entries.

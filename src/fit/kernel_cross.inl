@@ -1,5 +1,5 @@
 // What the covariance pass sums once the X_i are known, for any number type. Included
-// after kernel_evaluation.inl.
+// after kernel_evaluation.inl and kernel_cells.inl.
 
 // A tile of points, local frame.
 template <int p>
@@ -109,17 +109,22 @@ addMoments(int e, const Tile<p>& tile, CrossSums<p, shape>& sums)
 // Hessian, which is that of the weights.
 template <int p>
 HOLDFAST_INLINE void
-sharePattern(const Points& points, const State& state, int first, Tile<p>& tile)
+sharePattern(const Points& points,
+             const State& state,
+             int first,
+             Tile<p>& tile,
+             CellTotals& cells)
 {
   const PatternPoints& pattern = *points.pattern;
   for (int i = 0; i < tile.size; ++i) {
     const int at = first + i * kLanes;
-    Number r[3], outside[3];
+    Number r[3], outside[3], response[p];
     HOLDFAST_UNROLLED_FOR (int k = 0; k < 3; ++k)
       outside[k] = load(pattern.direction[k] + at);
     rotateIntoFrame(state.R, outside, r);
     HOLDFAST_UNROLLED_FOR (int a = 0; a < p; ++a)
-      store(dot(tile.X[i][a], r), pattern.response + a * points.padded_size + at);
+      response[a] = dot(tile.X[i][a], r);
+    cells.add<p>(at, response, tile.qt[i], r);
     const Number extra = load(pattern.extra + at);
     Number* S = tile.S[i];
     HOLDFAST_UNROLLED_FOR (int b = 0, pair = 0; b < 3; ++b)
@@ -134,11 +139,12 @@ addCrossTerms(const Points& points,
               const State& state,
               int first,
               Tile<p>& tile,
+              CellTotals& cells,
               CrossSums<p, shape>& sums,
               std::integer_sequence<int, a...>)
 {
   if (points.pattern != nullptr)
-    sharePattern(points, state, first, tile);
+    sharePattern(points, state, first, tile, cells);
   (addCrossRow<a>(tile, sums), ...);
   for (int e = 0; e < 6; ++e)
     addMoments(e, tile, sums);

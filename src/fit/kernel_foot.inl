@@ -101,6 +101,7 @@ footSums(const Points& points, const State& state, CovarianceSums& out)
   constexpr std::make_integer_sequence<int, p> rows;
   const Surface surface{state};
   CrossSums<p, shape> sums;
+  CellTotals cells(points);
   FootSearch<Surface> search(surface);
   setZero(sums);
   Tile<p> tile;
@@ -116,8 +117,9 @@ footSums(const Points& points, const State& state, CovarianceSums& out)
     if (!search.allMeet())
       return false;
     addFootRows(surface, feet, tile, sums, rows);
-    addCrossTerms(points, state, first, tile, sums, rows);
+    addCrossTerms(points, state, first, tile, cells, sums, rows);
   }
+  cells.finish();
   reduce(sums, out);
   search.reduce(out);
   surface.combine(out.L, out.gradient);

@@ -2,6 +2,7 @@
 // kernel_valid.inl are written in. No include guard: included once for every
 // instruction set, inside that set's namespace, after Highway and `hn`.
 
+using Scalar = double;
 constexpr hn::ScalableTag<double> kTag;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(kTag));
 
@@ -37,6 +38,12 @@ HWY_INLINE void
 storeByLane(const Number x[4], double* p)
 {
   hn::StoreInterleaved4(x[0].v, x[1].v, x[2].v, x[3].v, kTag, p);
+}
+
+HWY_INLINE Number
+roundedDown(Number x)
+{
+  return Number(hn::Floor(x.v));
 }
 
 #include "kernel_operators.inl"

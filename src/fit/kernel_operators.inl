@@ -44,11 +44,35 @@ sumsOfLanes(const Number* v, double* out)
       level[i] = pairSums(level[2 * i], level[2 * i + 1]);
   store(level[0], out);
 }
+
+// Numbers from `entry` on of a lane whose first is at y, of a row that storeByLane()
+// has stored four by four.
+template <typename Tag>
+HWY_INLINE hn::Vec<Tag>
+rowPart(Tag tag, const Scalar* y, int entry)
+{
+  constexpr int lanes = static_cast<int>(hn::MaxLanes(Tag()));
+  if constexpr (lanes <= 4) {
+    return hn::Load(tag, y + entry / 4 * 4 * kLanes + entry % 4);
+  }
+  else {
+    const hn::Half<Tag> half;
+    return hn::Combine(tag,
+                       rowPart(half, y, entry + lanes / 2),
+                       rowPart(half, y, entry));
+  }
+}
 #else
 HWY_INLINE void
 sumsOfLanes(const Number* v, double* out)
 {
   store(*v, out);
+}
+
+HWY_INLINE hn::Vec<hn::ScalableTag<Scalar>>
+rowPart(hn::ScalableTag<Scalar> tag, const Scalar* y, int entry)
+{
+  return hn::Load(tag, y + entry);
 }
 #endif
 
@@ -68,4 +92,14 @@ HWY_INLINE bool
 allLess(Number a, Number b)
 {
   return hn::AllTrue(kTag, hn::Lt(a.v, b.v));
+}
+
+// Adds the row of a lane to what is there.
+HWY_INLINE void
+addRow(const Scalar* y, int lane, Scalar* sum)
+{
+  for (int k = 0; k < kCellRow; k += kLanes)
+    hn::Store(hn::Add(hn::Load(kTag, sum + k), rowPart(kTag, y + 4 * lane, k)),
+              kTag,
+              sum + k);
 }

@@ -9,6 +9,11 @@
 //   store(Number, double*)    the reverse
 //   storeByLane(const Number x[4], double*)
 //                             the same of four, lane by lane
+//   Scalar                    one of those in a Number, which load() and store() know,
+//   too addRow(const Scalar* y, int lane, Scalar* sum)
+//                             adds kCellRow numbers of a lane, which storeByLane() has
+//                             stored four by four
+//   roundedDown(Number)
 //   sumOfLanes(Number)        their sum
 //   sumsOfLanes(const Number*, double*)
 //                             those of kLanes Numbers
@@ -16,8 +21,10 @@
 //   selectLess(a, b, x, y)    a < b ? x : y, lane by lane
 //   allLess(a, b)             a < b in every lane
 //   HOLDFAST_INLINE           before functions of the hot loop
+//   HOLDFAST_NOINLINE         before those that are to be called
 //   HOLDFAST_UNROLLED_FOR     `for` of constant length, whose arrays then live in
 //                             registers
+//   HOLDFAST_ROLLED_FOR       the reverse
 //
 // The notation is that of fit/kernel.h.
 
@@ -41,6 +48,35 @@ placeInFrame(const Surface& surface,
 }
 
 #include "kernel_evaluation.inl"
+
+HOLDFAST_INLINE Number
+smaller(Number a, Number b)
+{
+  return selectLess(a, b, a, b);
+}
+
+HOLDFAST_INLINE Number
+larger(Number a, Number b)
+{
+  return selectLess(a, b, b, a);
+}
+
+// The cells of points; pixels beyond all reason are in some cell, too.
+HOLDFAST_INLINE void
+findCells(const PatternPoints& pattern, int i, double* rows)
+{
+  const CellGrid& grid = pattern.grid;
+  const Number first(0.0), last(kCells - 1.0);
+  Number at[2];
+  HOLDFAST_UNROLLED_FOR (int k = 0; k < 2; ++k) {
+    const Number exact =
+        (load(pattern.pixel[k] + i) - grid.corner[k]) * grid.inverse_side;
+    at[k] = roundedDown(larger(first, smaller(exact, last)));
+  }
+  store((at[1] * kCells + at[0]) * kCellRow, rows);
+}
+
+#include "kernel_cells.inl"
 
 #include "kernel_cross.inl"
 
@@ -261,6 +297,7 @@ covarianceSums(const Points& points, const State& state, CovarianceSums& out)
   constexpr std::make_integer_sequence<int, p> rows;
   const Surface surface{state};
   CrossSums<p, shape> sums;
+  CellTotals cells(points);
   LTotals::Of<Number> of_L;
   setZero(sums);
   setZero(of_L);
@@ -281,8 +318,9 @@ covarianceSums(const Points& points, const State& state, CovarianceSums& out)
         tile.qt[i][k] = point.q[k] - state.centroid[k];
     }
     addHessian<ResidualPolicy>(surface, expanded, tile, sums, rows);
-    addCrossTerms(points, state, first, tile, sums, rows);
+    addCrossTerms(points, state, first, tile, cells, sums, rows);
   }
+  cells.finish();
   reduce(sums, out);
   reduceL(of_L, out);
   surface.combine(out.L, out.gradient);
@@ -436,12 +474,6 @@ residualsOfPoints(const Points& points, const State& state, double* out)
     const Number e = residual.first().e;
     store(e * e * residual.inverse, out + i);
   }
-}
-
-HOLDFAST_INLINE Number
-larger(Number a, Number b)
-{
-  return selectLess(a, b, b, a);
 }
 
 HOLDFAST_INLINE Number

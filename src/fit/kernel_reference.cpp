@@ -6,12 +6,15 @@
 #include <utility>
 
 #define HOLDFAST_INLINE inline
+#define HOLDFAST_NOINLINE
 #define HOLDFAST_UNROLLED_FOR(...) for (__VA_ARGS__)
+#define HOLDFAST_ROLLED_FOR(...) for (__VA_ARGS__)
 
 namespace holdfast { namespace kernel {
 namespace {
 
 using Number = double;
+using Scalar = double;
 constexpr int kLanes = 1;
 
 double
@@ -36,6 +39,19 @@ void
 storeByLane(const double x[4], double* p)
 {
   std::copy_n(x, 4, p);
+}
+
+void
+addRow(const double* y, int, double* sum)
+{
+  for (int k = 0; k < kCellRow; ++k)
+    sum[k] += y[k];
+}
+
+double
+roundedDown(double x)
+{
+  return std::floor(x);
 }
 
 double
@@ -92,6 +108,12 @@ accumulateCovarianceIn(Precision,
                        CovarianceSums& sums)
 {
   accumulateCovariance(model, residual, points, state, sums);
+}
+
+void
+sumOverCellsIn(Precision, const CellSums& cells, double* out)
+{
+  sumOverCells(cells, out);
 }
 
 #include "kernel_table.inl"

@@ -16,7 +16,9 @@
 #include <hwy/highway.h>
 
 #define HOLDFAST_INLINE HWY_INLINE
+#define HOLDFAST_NOINLINE HWY_NOINLINE
 #define HOLDFAST_UNROLLED_FOR(...) _Pragma("GCC unroll 32") for (__VA_ARGS__)
+#define HOLDFAST_ROLLED_FOR(...) _Pragma("GCC unroll 1") for (__VA_ARGS__)
 
 HWY_BEFORE_NAMESPACE();
 namespace holdfast { namespace kernel { namespace HWY_NAMESPACE {
@@ -63,6 +65,15 @@ accumulateCovarianceIn(Precision precision,
   if (precision == Precision::Double ||
       !single::accumulateByFeet(model, residual, points, state, sums))
     accumulateCovariance(model, residual, points, state, sums);
+}
+
+void
+sumOverCellsIn(Precision precision, const CellSums& cells, double* out)
+{
+  if (precision == Precision::Single)
+    single::sumOverCells(cells, out);
+  else
+    sumOverCells(cells, out);
 }
 
 #include "kernel_table.inl"

@@ -27,6 +27,15 @@ placeInFrame(const Surface& surface,
 
 #include "kernel_evaluation.inl"
 
+HOLDFAST_INLINE void
+findCells(const PatternPoints& pattern, int i, double* rows)
+{
+  wide::findCells(pattern, i, rows);
+  wide::findCells(pattern, i + wide::kLanes, rows + wide::kLanes);
+}
+
+#include "kernel_cells.inl"
+
 #include "kernel_cross.inl"
 
 #include "kernel_foot_point.inl"

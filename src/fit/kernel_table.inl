@@ -1,6 +1,6 @@
 // The functions of the kernel as callers see them, of the instruction set this file is
 // being compiled for. Included after kernel_point.inl and accumulateNormalIn(),
-// accumulateCovarianceIn() with a precision.
+// accumulateCovarianceIn(), sumOverCellsIn() with a precision.
 
 constexpr Kernel
 makeKernel(const char* instruction_set)
@@ -16,7 +16,6 @@ makeKernel(const char* instruction_set)
           meetRays,
           accumulatePixels,
           neighborVariances,
-          sumInCells,
-          sumOverCells,
+          sumOverCellsIn,
           congruence};
 }

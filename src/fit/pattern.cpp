@@ -1,6 +1,5 @@
 #include "pattern.h"
 
-#include "geometry/symmetric.h"
 #include <holdfast/geometry/constants.h>
 
 #include "surface_fit.h"
@@ -17,7 +16,7 @@ namespace holdfast {
 namespace {
 
 using kernel::kCells, kernel::kCellRow;
-using Sum = Eigen::Matrix<double, kCellRow, kCellRow, Eigen::RowMajor>;
+using Sum = Eigen::Matrix<double, kCellRow, kCellRow>; // symmetric
 
 // A wave shorter than this many sides of a cell changes too much within one.
 constexpr double kShortWaveInCells = 0.5;
@@ -50,23 +49,30 @@ constexpr double kEdgeInReaches = 6.0;
 class CellMeans {
 public:
   CellMeans(double length, double side)
+  : spread_(length * length + side * side / 6.0)
+  , side_(side)
+  , within_(length / std::sqrt(spread_))
+  {}
+
+  /// In one and the same interval.
+  double within() const
   {
-    const double spread = length * length + side * side / 6.0;
-    mean_ = length / std::sqrt(spread);
-    ratio_ = std::exp(-0.5 * side * side / spread);
-    change_ = ratio_ * ratio_;
+    return within_;
   }
 
-  double next()
+  void write(double means[kCells]) const
   {
-    const double mean = mean_;
-    mean_ *= ratio_; // exponents go by squares: 0, 1, 4, 9
-    ratio_ *= change_;
-    return mean;
+    double mean = within_, ratio = std::exp(-0.5 * side_ * side_ / spread_);
+    const double change = ratio * ratio;
+    for (int apart = 0; apart < kCells; ++apart) {
+      means[apart] = mean;
+      mean *= ratio; // exponents go by squares: 0, 1, 4, 9
+      ratio *= change;
+    }
   }
 
 private:
-  double mean_, ratio_, change_;
+  double spread_, side_, within_;
 };
 
 kernel::Points
@@ -75,38 +81,6 @@ withPattern(const PointBatch& batch, const kernel::PatternPoints& shared)
   kernel::Points points = kernelPoints(batch);
   points.pattern = &shared;
   return points;
-}
-
-// d[gradient | moments in the axes of R, over N] / d[gradient | sums of moments].
-PatternMatrix
-turnOfMoments(const Eigen::Matrix3d& R, int count)
-{
-  const double scale = 1.0 / count;
-  PatternMatrix turn = PatternMatrix::Identity();
-  turn.block<3, 3>(6, 6) = scale * R.transpose();
-  for (int e = 0; e < symmetric::kSize; ++e)
-    for (int o = 0; o < symmetric::kSize; ++o) {
-      const int i = symmetric::kRow[e], j = symmetric::kColumn[e];
-      const int b = symmetric::kRow[o], c = symmetric::kColumn[o];
-      turn(9 + e, 9 + o) =
-          scale * (R(b, i) * R(c, j) + (b == c ? 0.0 : R(c, i) * R(b, j)));
-    }
-  return turn;
-}
-
-// T Q T^T of a T that is the identity, then two blocks.
-PatternMatrix
-turned(const PatternMatrix& T, const PatternMatrix& Q)
-{
-  PatternMatrix half = Q, full;
-  half.middleRows<3>(6) = T.block<3, 3>(6, 6).lazyProduct(Q.middleRows<3>(6));
-  half.middleRows<6>(9) = T.block<6, 6>(9, 9).lazyProduct(Q.middleRows<6>(9));
-  full = half;
-  full.middleCols<3>(6) =
-      half.middleCols<3>(6).lazyProduct(T.block<3, 3>(6, 6).transpose());
-  full.middleCols<6>(9) =
-      half.middleCols<6>(9).lazyProduct(T.block<6, 6>(9, 9).transpose());
-  return full;
 }
 
 } // namespace
@@ -160,7 +134,7 @@ PatternSupport::writeExtra(const kernel::Points& points, PointBatch& batch) cons
     else {
       // The sum over pairs of cells holds every point with itself, as if it were
       // anywhere in the cell.
-      const double mean = CellMeans(wave.length_px, side_px_).next();
+      const double mean = CellMeans(wave.length_px, side_px_).within();
       within_cell += wave.variance * mean * mean;
     }
   }
@@ -178,41 +152,40 @@ void
 PatternSupport::writeCovariance(const CorrelatedNoise& noise,
                                 kernel::CellSums& cells) const
 {
-  for (auto& row : cells.covariance)
-    std::fill(std::begin(row), std::end(row), 0.0);
-  for (const CorrelatedNoise::Component& wave : noise.components()) {
-    if (isShort(wave))
-      continue;
-    double along[kCells];
-    CellMeans means(wave.length_px, side_px_);
-    for (double& mean : along)
-      mean = means.next();
-    for (int down = 0; down < kCells; ++down)
+  struct Wave {
+    double variance, means[kCells];
+  };
+  // Kept between patches: no allocation once they have seen the most.
+  thread_local std::vector<Wave> waves;
+  waves.resize(noise.components().size());
+  std::size_t count = 0;
+  for (const CorrelatedNoise::Component& component : noise.components())
+    if (!isShort(component)) {
+      Wave& wave = waves[count++];
+      wave.variance = component.variance;
+      CellMeans(component.length_px, side_px_).write(wave.means);
+    }
+  waves.resize(count);
+  for (int down = 0; down < kCells; ++down) {
+    double sum[kCells] = {};
+    for (const Wave& wave : waves) {
+      const double along = wave.variance * wave.means[down];
       for (int across = 0; across < kCells; ++across)
-        cells.covariance[down][across] += wave.variance * along[down] * along[across];
+        sum[across] += along * wave.means[across];
+    }
+    std::copy_n(sum, kCells, cells.covariance[down]);
   }
 }
 
 PatternMatrix
-PatternSupport::sum(const PointBatch& batch,
-                    const Scatter& scatter,
-                    const Eigen::Matrix3d& R,
-                    double* response) const
+PatternSupport::sum(const CorrelatedNoise& noise,
+                    kernel::Precision precision,
+                    kernel::CellSums& cells) const
 {
-  kernel::PatternPoints shared = kernelPattern(batch);
-  shared.response = response;
-  kernel::CellSums cells;
-  for (auto& cell : cells.y)
-    std::fill(std::begin(cell), std::end(cell), 0.0);
-  kernel::kernel().sumInCells(withPattern(batch, shared),
-                              scatter.mean.data(),
-                              {{u0_, v0_}, 1.0 / side_px_},
-                              cells);
-  writeCovariance(*batch.pattern(), cells);
+  writeCovariance(noise, cells);
   alignas(64) Sum sum;
-  kernel::kernel().sumOverCells(cells, sum.data());
-  return turned(turnOfMoments(R, batch.size()),
-                sum.topLeftCorner<kPatternTerms, kPatternTerms>());
+  kernel::kernel().sumOverCells(precision, cells, sum.data());
+  return sum.topLeftCorner<kPatternTerms, kPatternTerms>();
 }
 
 } // namespace holdfast

@@ -18,11 +18,11 @@
 
 #include <Eigen/Core>
 
+#include <algorithm>
+#include <cstddef>
 #include <vector>
 
 namespace holdfast {
-
-struct Scatter;
 
 /// y of a cell: X_i r_i (6), D_i r_i for mean (3) and scatter xx xy xz yy yz zz (6).
 inline constexpr int kPatternTerms = kernel::kMaxTheta + 9;
@@ -33,11 +33,11 @@ using PatternMatrix =
 /// uses.
 class PaddedRows {
 public:
-  /// Zero.
-  void reset(int rows, int padded_size)
+  /// What is written, zero or not, is left to the caller.
+  void resize(int rows, int padded_size)
   {
     lines_per_row_ = static_cast<std::size_t>(padded_size / PointBatch::kLaneMultiple);
-    lines_.assign(static_cast<std::size_t>(rows) * lines_per_row_, {});
+    lines_.resize(static_cast<std::size_t>(rows) * lines_per_row_);
   }
 
   double* row(int i)
@@ -62,13 +62,29 @@ public:
   /// EXTRA.
   explicit PatternSupport(PointBatch& batch);
 
-  /// The pattern's share in the gradient's and the moments' covariance, axes of the
-  /// frame R; what EXTRA stands for not included.
-  /// \param response X_i r_i as from the kernel.
-  PatternMatrix sum(const PointBatch& batch,
-                    const Scatter& scatter,
-                    const Eigen::Matrix3d& R,
-                    double* response) const;
+  /// The cells over the points.
+  kernel::CellGrid grid() const
+  {
+    return {{u0_, v0_}, 1.0 / side_px_};
+  }
+
+  /// In which of them a pixel lies.
+  int cellOf(double u, double v) const
+  {
+    const kernel::CellGrid cells = grid();
+    const auto along = [&](double from_corner) {
+      const double sides = from_corner * cells.inverse_side;
+      return static_cast<int>(std::clamp(sides, 0.0, kernel::kCells - 1.0));
+    };
+    return kernel::kCells * along(v - v0_) + along(u - u0_);
+  }
+
+  /// The pattern's share in the gradient's and the moments' covariance, what EXTRA
+  /// stands for not included.
+  /// \param cells sums of y_i, of which the covariance is added.
+  PatternMatrix sum(const CorrelatedNoise& noise,
+                    kernel::Precision precision,
+                    kernel::CellSums& cells) const;
 
 private:
   bool isShort(const CorrelatedNoise::Component& wave) const;

@@ -276,11 +276,9 @@ public:
     const CorrelatedNoise* shared = problem.batch.pattern();
     if (shared == nullptr || shared->variance() == 0.0)
       return;
-    // Kept between patches: no allocation once they have seen the largest.
-    thread_local PaddedRows response;
-    response.reset(kernel::kMaxTheta, points_.padded_size);
     pattern_ = kernelPattern(problem.batch);
-    pattern_.response = response.row(0);
+    pattern_.grid = problem.support.grid();
+    pattern_.cells = &cells_;
     points_.pattern = &pattern_;
   }
 
@@ -316,6 +314,7 @@ public:
         lanes);
     kernel::PatternPoints pattern = pattern_;
     pattern.extra = less.front().value;
+    pattern.cells = nullptr;
     kernel::Points points = points_;
     points.pattern = &pattern;
     accumulate(points, surface, sums);
@@ -323,15 +322,13 @@ public:
     return result;
   }
 
-  // After the last run, at the same surface.
-  void addPattern(const UnboundedSurface& surface, Linearization& linearization) const
+  // After the last run.
+  void addPattern(Linearization& linearization)
   {
     linearization.has_pattern = points_.pattern != nullptr;
     if (linearization.has_pattern)
-      linearization.pattern = problem_.support.sum(problem_.batch,
-                                                   problem_.scatter,
-                                                   surface.R,
-                                                   pattern_.response);
+      linearization.pattern =
+          problem_.support.sum(*problem_.batch.pattern(), problem_.precision, cells_);
   }
 
 private:
@@ -350,6 +347,7 @@ private:
   const SurfaceProblem& problem_;
   kernel::Points points_;
   kernel::PatternPoints pattern_{};
+  kernel::CellSums cells_; // where there is a pattern
 };
 
 // tr(H^-1 Cov(E_theta)): how much of chi2 the surface takes up on average.
@@ -386,18 +384,18 @@ double
 takenUpWithoutResiduals(const SurfaceProblem& problem, const UnboundedSurface& surface)
 {
   thread_local PaddedRows moved;
-  moved.reset(3, problem.points.padded_size);
+  moved.resize(3, problem.points.padded_size);
   double* const onto[3] = {moved.row(0), moved.row(1), moved.row(2)};
   moveOnto(surface, problem.points, onto);
   SurfaceProblem ideal = problem;
   ideal.precision = Precision::Double; // what residuals do not determine is not much
   std::copy_n(onto, 3, ideal.points.channel);
-  const CovariancePass pass(ideal);
+  CovariancePass pass(ideal);
   kernel::CovarianceSums sums;
   Linearization linearization;
   pass.run(surface, sums);
   linearize(surface, problem.scatter, sums, linearization);
-  pass.addPattern(surface, linearization);
+  pass.addPattern(linearization);
   return takenUp(linearization, symmetricInverse(linearization.H));
 }
 
@@ -436,7 +434,7 @@ polish(const SurfaceProblem& problem, const FitOptions& options, SurfaceFit& fit
   constexpr double kClimb = 0.25;
   const UnboundedSurface start = fit.surface;
   const double start_cost = fit.cost;
-  const CovariancePass pass(problem);
+  CovariancePass pass(problem);
   kernel::CovarianceSums sums;
   for (fit.polish_steps = 1; fit.polish_steps <= kMaxPolishSteps; ++fit.polish_steps) {
     pass.run(fit.surface, sums);
@@ -460,7 +458,7 @@ polish(const SurfaceProblem& problem, const FitOptions& options, SurfaceFit& fit
     const bool arrived =
         std::sqrt(std::max(0.0, -step.dot(gradient))) < options.polish_tolerance_sigma;
     if (arrived)
-      pass.addPattern(fit.surface, fit.linearization);
+      pass.addPattern(fit.linearization);
     if (arrived && options.separate_pattern)
       fit.white = pass.white(fit.surface);
     if (arrived && fit.linearization.has_pattern)
@@ -620,6 +618,8 @@ kernelPattern(const PointBatch& batch)
            batch.channel(PointBatch::EY),
            batch.channel(PointBatch::EZ)},
           batch.channel(PointBatch::EXTRA),
+          {},
+          1.0 / batch.size(),
           nullptr};
 }
 
@@ -733,25 +733,35 @@ symmetricInverse(const ThetaMatrix& H)
   return SmallCholesky<kernel::kMaxTheta>(H).inverse();
 }
 
+namespace {
+
+// Of E_theta + A ds. lazyProduct: for matrices this small Eigen's blocked product costs
+// more than the work.
 ThetaMatrix
-patternOfGradient(const Linearization& l)
+gradientCovariance(const ThetaMatrix& XX,
+                   const ThetaByMoments& XD,
+                   const MomentMatrix& DD,
+                   const ThetaByMoments& A)
 {
-  Eigen::Matrix<double, kernel::kMaxTheta, kPatternTerms> J;
-  J << ThetaMatrix::Identity(), l.A;
-  return J.lazyProduct(l.pattern).eval().lazyProduct(J.transpose());
+  const ThetaByMoments half = XD + 0.5 * A.lazyProduct(DD);
+  const ThetaMatrix cross = half.lazyProduct(A.transpose());
+  return XX + cross + cross.transpose();
 }
+
+} // namespace
 
 ThetaMatrix
 thetaCovariance(const Linearization& l, const ThetaMatrix& hessian)
 {
-  // lazyProduct: for matrices this small Eigen's blocked product costs more than the
-  // work.
-  const ThetaByMoments half = l.XD + 0.5 * l.A.lazyProduct(l.DD);
-  const ThetaMatrix cross = half.lazyProduct(l.A.transpose());
+  constexpr int p = kernel::kMaxTheta;
+  const ThetaMatrix gradient =
+      l.has_pattern ?
+          gradientCovariance(l.XX + l.pattern.topLeftCorner<p, p>(),
+                             l.XD + l.pattern.topRightCorner<p, kMoments>(),
+                             l.DD + l.pattern.bottomRightCorner<kMoments, kMoments>(),
+                             l.A) :
+          gradientCovariance(l.XX, l.XD, l.DD, l.A);
   const ThetaMatrix inverse = symmetricInverse(hessian);
-  ThetaMatrix gradient = l.XX + cross + cross.transpose();
-  if (l.has_pattern)
-    gradient += patternOfGradient(l);
   return inverse.lazyProduct(ThetaMatrix(gradient.lazyProduct(inverse)));
 }
 

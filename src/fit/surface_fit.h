@@ -95,10 +95,6 @@ SurfaceFit fitSurface(kernel::Model model,
 /// Inverse of a positive definite matrix.
 ThetaMatrix symmetricInverse(const ThetaMatrix& H);
 
-/// What errors that points share add to the covariance of the gradient at the estimate,
-/// E_theta + A ds.
-ThetaMatrix patternOfGradient(const Linearization& linearization);
-
 /// First-order covariance of theta, from the Hessian or its Gauss-Newton part.
 ThetaMatrix thetaCovariance(const Linearization& linearization,
                             const ThetaMatrix& hessian);
@@ -106,7 +102,7 @@ ThetaMatrix thetaCovariance(const Linearization& linearization,
 /// The batch as the kernel sees it.
 kernel::Points kernelPoints(const PointBatch& batch);
 
-/// What its points share errors by, without responses.
+/// What its points share errors by, without cells.
 kernel::PatternPoints kernelPattern(const PointBatch& batch);
 
 /// The surface as the kernel sees it.

@@ -1,10 +1,10 @@
 #include "fit/surface_start.h"
 
 #include "fit/surface_fit.h"
+#include "geometry/small_cholesky.h"
 
 #include <holdfast/geometry/rotation.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
@@ -40,10 +40,9 @@ leastSquaresQuadric(const kernel::Points& points, const Scatter& scatter)
   for (double& s : scale)
     s = s > 0.0 ? 1.0 / s : 0.0;
   A = (scale.asDiagonal() * A * scale.asDiagonal()).eval();
-  const Eigen::LLT<Eigen::Matrix<double, 6, 6>> cholesky(A);
-  constexpr double kSmallestPivot = 1e-5; // square root of the solver's pivot tolerance
-  if (cholesky.info() != Eigen::Success ||
-      cholesky.matrixLLT().diagonal().minCoeff() < kSmallestPivot)
+  const SmallCholesky<6> cholesky(A);
+  constexpr double kSmallestPivot = 1e-10; // as the solver's
+  if (cholesky.smallestPivot() < kSmallestPivot)
     return {};
   const Eigen::Matrix<double, 6, 1> x =
       scale.cwiseProduct(cholesky.solve(scale.cwiseProduct(b)));
@@ -62,8 +61,9 @@ quadricStart(kernel::Model model, const StartRequest& request)
   const double stretch = std::sqrt(1.0 + quadric.slope.squaredNorm());
   const Eigen::Vector3d up =
       Eigen::Vector3d(-quadric.slope.x(), -quadric.slope.y(), 1.0) / stretch;
-  const Eigen::Vector2d tilt = rxyFromNormal(up);
-  surface.R = scatter.axes * expMap({tilt.x(), tilt.y(), 0.0});
+  // The shortest rotation from z to the normal, which is nearer to z than 90 degrees.
+  const Eigen::Matrix3d X = skew({-up.y(), up.x(), 0.0});
+  surface.R = scatter.axes * (Eigen::Matrix3d::Identity() + X + X * X / (1.0 + up.z()));
   surface.k = quadric.k / stretch;
   return surface;
 }

@@ -59,6 +59,15 @@ planeTurn(double angle)
   return planeTurn(W);
 }
 
+// The same for axes turned by the angle of a vector (c, s) of any length.
+inline Eigen::Matrix3d
+planeTurn(double c, double s)
+{
+  Eigen::Matrix2d W;
+  W << c, s, -s, c;
+  return planeTurn(W) / (c * c + s * s);
+}
+
 // Principal axes of the symmetric matrix xx xy yy in a plane. Written out: Eigen's
 // solver costs every file that has one for this size seconds.
 struct PlaneAxes {
@@ -71,9 +80,14 @@ planeAxes(double xx, double xy, double yy)
 {
   const double mean = 0.5 * (xx + yy), half = 0.5 * (xx - yy);
   const double radius = std::hypot(half, xy);
-  // Of the upper eigenvalue.
-  const double angle = 0.5 * std::atan2(xy, half);
-  const double c = std::cos(angle), s = std::sin(angle);
+  // Of the upper eigenvalue; cosine and sine of half the angle of (half, xy).
+  double c = 1.0, s = 0.0;
+  if (radius > 0.0) {
+    const double larger = std::sqrt(0.5 + 0.5 * std::abs(half) / radius);
+    const double other = 0.5 * xy / radius / larger;
+    c = half < 0.0 ? std::abs(other) : larger;
+    s = half < 0.0 ? std::copysign(larger, xy) : other;
+  }
   return mean < 0.0 ? PlaneAxes{mean + radius, mean - radius, {c, s}} :
                       PlaneAxes{mean - radius, mean + radius, {-s, c}};
 }

@@ -210,12 +210,14 @@ PointGatherer::sharePattern(PointBatch& batch) const
   double* const direction[3] = {batch.channel(PointBatch::EX),
                                 batch.channel(PointBatch::EY),
                                 batch.channel(PointBatch::EZ)};
-  double* u = batch.channel(PointBatch::U);
-  double* v = batch.channel(PointBatch::V);
+  double* __restrict u = batch.channel(PointBatch::U);
+  double* __restrict v = batch.channel(PointBatch::V);
+  const Camera camera = camera_; // a copy, which what is written does not change
+  const auto [x, y, z] = measured;
   for (int i = 0; i < n; ++i) {
-    const double inverse = 1.0 / measured[2][i];
-    u[i] = camera_.fx * measured[0][i] * inverse + camera_.cx;
-    v[i] = camera_.fy * measured[1][i] * inverse + camera_.cy;
+    const double inverse = 1.0 / z[i];
+    u[i] = camera.fx * x[i] * inverse + camera.cx;
+    v[i] = camera.fy * y[i] * inverse + camera.cy;
   }
   const bool at_reference = noise_at_surface_ && stored_.empty();
   noise_->patternDirections(n, at_reference ? reference : measured, direction);

@@ -69,12 +69,17 @@ StereoNoiseModel::patternDirections(int n,
                                     double* const direction[3]) const
 {
   const double per_z = -1.0 / (parameters_.focal_px * parameters_.baseline_m);
+  const double* __restrict x = point[0];
+  const double* __restrict y = point[1];
   const double* __restrict z = point[2];
-  for (int k = 0; k < 3; ++k) {
-    const double* __restrict q = point[k];
-    double* __restrict r = direction[k];
-    for (int i = 0; i < n; ++i)
-      r[i] = per_z * z[i] * q[i];
+  double* __restrict rx = direction[0];
+  double* __restrict ry = direction[1];
+  double* __restrict rz = direction[2];
+  for (int i = 0; i < n; ++i) {
+    const double scale = per_z * z[i];
+    rx[i] = scale * x[i];
+    ry[i] = scale * y[i];
+    rz[i] = scale * z[i];
   }
 }
 

@@ -3,6 +3,7 @@
 #include "congruence.h"
 
 #include "fit/models/models.h"
+#include "geometry/symmetric.h"
 
 #include "second_order.h"
 #include "stagewise.h"
@@ -135,7 +136,38 @@ countedCovariance(const PointBatch& batch, int i, bool with_pattern)
   return Sigma + along * r * r.transpose();
 }
 
-// The pairs of points that share errors. PatternSupport sums six rows of responses with
+// As kernel::PatternPoints::cells, of other responses: all the plane's, and `rows` of
+// the surface from the first on.
+kernel::CellSums
+sumInCells(const PatchFit& fit,
+           const PointBatch& batch,
+           const StageGradients& terms,
+           int first,
+           int rows)
+{
+  const Eigen::Matrix3d &R = fit.surface.surface.R, &Rp = fit.plane.surface.R;
+  const double per_count = 1.0 / batch.size();
+  kernel::CellSums cells{};
+  for (int i = 0; i < batch.size(); ++i) {
+    const Eigen::Vector3d direction = sharedDirection(batch, i);
+    const Eigen::Vector3d r = R.transpose() * direction;
+    const Eigen::Vector3d qt =
+        R.transpose() * (batch.point(i) - batch.origin() - fit.scatter.mean);
+    Eigen::Map<Eigen::Matrix<double, kPatternTerms, 1>> y(
+        cells.y[fit.support.cellOf(batch.channel(PointBatch::U)[i],
+                                   batch.channel(PointBatch::V)[i])]);
+    y.head(terms.np) += terms.plane(i) * (Rp.transpose() * direction);
+    y.segment(terms.np, rows) += terms.surface(i).middleRows(first, rows) * r;
+    y.segment<3>(kernel::kMaxTheta) += per_count * r;
+    for (int e = 0; e < symmetric::kSize; ++e) {
+      const int b = symmetric::kRow[e], c = symmetric::kColumn[e];
+      y[kernel::kMaxTheta + 3 + e] += per_count * (qt[b] * r[c] + qt[c] * r[b]);
+    }
+  }
+  return cells;
+}
+
+// The pairs of points that share errors. There is room for six rows of responses with
 // themselves and with the moments: here the plane's in front, and behind them those of
 // the surface, as many as there is room for, in turn.
 void
@@ -144,22 +176,12 @@ addPatternOfPlaneStage(const PatchFit& fit,
                        const StageGradients& terms,
                        PlaneStageSums& sums)
 {
-  const Eigen::Matrix3d &R = fit.surface.surface.R, &Rp = fit.plane.surface.R;
-  const int padded = batch.paddedSize(), room = kernel::kMaxTheta - terms.np;
-  thread_local PaddedRows response;
+  const int room = kernel::kMaxTheta - terms.np;
   for (int first = 0; first < terms.n; first += room) {
     const int rows = std::min(room, terms.n - first);
-    response.reset(kernel::kMaxTheta, padded);
-    for (int i = 0; i < batch.size(); ++i) {
-      const Eigen::Vector3d r = sharedDirection(batch, i);
-      Eigen::Matrix<double, kernel::kMaxTheta, 1> y;
-      y.head(terms.np) = terms.plane(i) * (Rp.transpose() * r);
-      y.segment(terms.np, rows) =
-          terms.surface(i).middleRows(first, rows) * (R.transpose() * r);
-      for (int a = 0; a < terms.np + rows; ++a)
-        response.row(a)[i] = y[a];
-    }
-    const PatternMatrix sum = fit.support.sum(batch, fit.scatter, R, response.row(0));
+    kernel::CellSums cells = sumInCells(fit, batch, terms, first, rows);
+    const PatternMatrix sum =
+        fit.support.sum(*batch.pattern(), kernel::Precision::Double, cells);
     sums.with_surface.block(0, first, terms.np, rows) +=
         sum.block(0, terms.np, terms.np, rows);
     if (first == 0)
@@ -240,10 +262,10 @@ noiseOf(const Linearization& l)
     for (int i = 0; i < kMoments; ++i)
       C(kTheta + i, kTheta + j) = l.DD(i, j);
   }
-  // What errors that points share add.
-  for (int j = 0; l.has_pattern && j < kPatternTerms; ++j)
-    for (int i = 0; i < kPatternTerms; ++i)
-      C(i, j) += l.pattern(i, j);
+  // What errors that points share add; symmetric, so that both go along what is stored.
+  for (int i = 0; l.has_pattern && i < kPatternTerms; ++i)
+    for (int j = 0; j < kPatternTerms; ++j)
+      C(i, j) += l.pattern(j, i);
   return C;
 }
 
@@ -397,12 +419,12 @@ isPositiveSemiDefiniteByPivots(const StateMatrix& S)
       pivot -= L[j][k] * L[j][k];
     if (!(pivot > 0.0))
       return false;
-    L[j][j] = std::sqrt(pivot);
+    const double inverse = 1.0 / std::sqrt(pivot);
     for (int i = j + 1; i < n; ++i) {
       double entry = S(i, j) * scale[i] * scale[j];
       for (int k = 0; k < j; ++k)
         entry -= L[i][k] * L[j][k];
-      L[i][j] = entry / L[j][j];
+      L[i][j] = entry * inverse;
     }
   }
   return true;
