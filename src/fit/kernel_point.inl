@@ -9,8 +9,9 @@
 //   store(Number, double*)    the reverse
 //   storeByLane(const Number x[4], double*)
 //                             the same of four, lane by lane
-//   Scalar                    one of those in a Number, which load() and store() know,
-//   too addRow(const Scalar* y, int lane, Scalar* sum)
+//   Scalar                    one of those in a Number, which load() and store() also
+//                             take
+//   addRow(const Scalar* y, int lane, Scalar* sum)
 //                             adds kCellRow numbers of a lane, which storeByLane() has
 //                             stored four by four
 //   roundedDown(Number)
