@@ -17,7 +17,8 @@ sanitizers="address;undefined"
 programs=OFF
 several=OFF # sources at a time, where it is for more than a few tests
 tests=(fit_degenerate pcl_misuse point_types openni2_grabber cloud_io patch_io
-  atomic_file config locale patch_extraction parallel)
+  atomic_file config locale patch_extraction parallel
+  depth_images cloud_dialects trajectory_file foot_file patch_map contact_risk risk_grid)
 case ${1:-} in
 --all)
   folder=$root/build-sanitize-all

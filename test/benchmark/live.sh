@@ -14,6 +14,6 @@ live() {
 }
 
 live --max-patches 300 --seconds 60
-for patches in 400 500 600 700 800 1000; do
+for patches in 500 1000 1500 2000; do
   live --max-patches "$patches" --budget-ms 33 --seconds 10
 done
