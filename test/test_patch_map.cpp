@@ -5,6 +5,7 @@
 #include "support/spot.h"
 
 #include <holdfast/fusion/patch_map.h>
+#include <holdfast/fusion/pattern_reach.h>
 #include <holdfast/fusion/registration.h>
 #include <holdfast/geometry/rotation.h>
 
@@ -148,6 +149,55 @@ TEST(PatchMap, IsTheSameInATurnedWorld)
     EXPECT_LT((scale.asDiagonal() * (S - T) * scale.asDiagonal()).cwiseAbs().maxCoeff(),
               1e-9);
   }
+}
+
+// A camera that moves sees a spot through pixels whose pattern is that of the frame
+// before in part, wherever an epoch began; at the end of one it is not new.
+TEST(PatchMap, CountsWhatIsLeftOfThePattern)
+{
+  constexpr int kTrials = 400, kViews = 12;
+  constexpr double kFocal = 525.0, kStep = 40.0 / kFocal, kPattern = 3e-3;
+  PatchMapOptions options;
+  options.pattern =
+      patternReach(CorrelatedNoise({{{0.1, 79.0, PatternShape::Exponential}}}), kFocal);
+  const Eigen::MatrixXd correlation =
+      Eigen::MatrixXd::NullaryExpr(kViews, kViews, [&](Eigen::Index i, Eigen::Index j) {
+        const double moved = kStep * static_cast<double>(std::abs(i - j));
+        return patternCorrelation(options.pattern, 0.5 * kRadius, moved)[0];
+      });
+  const Eigen::MatrixXd root = kPattern * Eigen::MatrixXd(correlation.llt().matrixL());
+  double squares = 0.0, variance = 0.0;
+  int epochs = 0;
+  for (std::uint64_t trial = 0; trial < kTrials; ++trial) {
+    Random random(trial);
+    const Eigen::VectorXd b =
+        root * Eigen::VectorXd::NullaryExpr(kViews, [&] { return random.normal(); });
+    PatchMap map(options);
+    for (int view = 0; view < kViews; ++view) {
+      if (view > 0)
+        map.move({Eigen::Matrix3d::Identity(), {kStep, 0.0, 0.0}},
+                 1e-12 * JetMatrix::Identity());
+      Measurement m = measurementAt(1, {-kStep * view, 0.0, 1.0}, &random);
+      m.jet.value[0] += b[view];
+      m.jet.pattern(0, 0) = kPattern * kPattern;
+      map.update({m});
+    }
+    ASSERT_EQ(map.patches().size(), 1u);
+    const MapPatch& patch = map.patches().front();
+    const double sigma2 = patch.jet.covariance()(0, 0);
+    squares += patch.jet.value()[0] * patch.jet.value()[0] / sigma2 / kTrials;
+    variance += sigma2 / kTrials;
+    epochs = patch.epochs;
+  }
+  std::printf("  %d epochs, sigma %.2f mm of %.2f, NEES %.3f\n",
+              epochs,
+              1e3 * std::sqrt(variance),
+              1e3 * kPattern,
+              squares);
+  EXPECT_GT(epochs, 2);
+  const test::NeesBounds bounds(kTrials);
+  EXPECT_LT(squares, bounds.highest);
+  EXPECT_GT(squares, bounds.lowest);
 }
 
 TEST(PatchMap, ReplacesWhatIsContradicted)

@@ -555,22 +555,19 @@ PatchMap::fuse(const Measurement& m, const Pose& anchor, MapPatch& patch) const
   JetMatrix white = jet->white;
   if (pose_covariance_)
     white += errorOf(*pose_covariance_, jet->value, patch.anchor);
-  const Eigen::Vector3d left = patternLeft(m, patch, options_);
-  const bool is_new_epoch = jet->pattern.isZero(0.0) || left[0] < kNextToNothing;
+  // What was lost on the way does not come back. Of the view before, more is left than
+  // of the epoch's start, also where another epoch begins.
+  const Eigen::Vector3d before = patch.epoch_kept.cast<double>();
+  const Eigen::Vector3d kept =
+      jet->pattern.isZero(0.0) ?
+          Eigen::Vector3d::Zero() :
+          Eigen::Vector3d(patternLeft(m, patch, options_).cwiseMin(before));
+  const bool is_new_epoch = kept[0] < kNextToNothing;
   JetFilter filter = patch.jet;
-  Eigen::Vector3d kept = Eigen::Vector3d::Zero();
-  if (is_new_epoch) {
-    filter.changePattern(JetVector::Zero(), jet->pattern);
-    if (patch.epochs >= options_.max_views)
-      filter.fade(1.0 + 1.0 / options_.max_views);
-  }
-  else {
-    // What was lost on the way does not come back.
-    kept = left.cwiseMin(patch.epoch_kept.cast<double>());
-    const Eigen::Vector3d step =
-        kept.cwiseQuotient(patch.epoch_kept.cast<double>().cwiseMax(1e-9));
-    filter.changePattern(byOrder(step), jet->pattern);
-  }
+  filter.changePattern(byOrder(kept.cwiseQuotient(before.cwiseMax(1e-9))),
+                       jet->pattern);
+  if (is_new_epoch && patch.epochs >= options_.max_views)
+    filter.fade(1.0 + 1.0 / options_.max_views);
   const ThirdToJet off = by_third - thirdToJetOfDisc(patch.radius_m);
   if (!filter.update(jet->value, white, gate_, off))
     return false;
