@@ -27,6 +27,7 @@ namespace {
 struct RiskChoice {
   WalkChoice walk{{"boulder_field"}, 40};
   double radius_m = 0.08;
+  double max_depth_change = PatchMapOptions().max_depth_change;
   int draws = 200000;
   int surfaces = 60;
 };
@@ -306,6 +307,7 @@ addWalks(const RiskChoice& choice, const ExperimentSettings& settings, Report& r
         RiskWalk walk;
         walk.scene = scene;
         walk.radius_m = choice.radius_m;
+        walk.max_depth_change = choice.max_depth_change;
         walk.frames = choice.walk.frames;
         walk.step_m = choice.walk.step_m;
         walk.stride = choice.walk.stride;
@@ -392,6 +394,13 @@ addChoices(CLI::App& command, RiskChoice& choice)
 {
   addWalkOptions(command, choice.walk);
   command.add_option("--radius", choice.radius_m, "Of the patches, m")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command
+      .add_option(
+          "--max-depth-change",
+          choice.max_depth_change,
+          "Of a spot, as a share, beyond which the map takes the pattern as new")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command.add_option("--draws", choice.draws, "Of a surface, for its closed forms")

@@ -199,6 +199,7 @@ public:
       sensor_.pattern.waves.clear();
     PatchMapOptions map_options;
     map_options.radius_m = walk.radius_m;
+    map_options.max_depth_change = walk.max_depth_change;
     options_.map = mapOptionsFor(sensor_, map_options);
     options_.extraction.threads = walk.threads;
     WalkOptions way;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <holdfast/contact/contact_risk.h>
+#include <holdfast/fusion/patch_map.h>
 #include <holdfast/progress.h>
 #include <holdfast/sensor/sensor.h>
 
@@ -37,6 +38,7 @@ struct ChosenCase {
 struct RiskWalk {
   std::string scene = "boulder_field";
   double radius_m = 0.08; ///< of the map
+  double max_depth_change = PatchMapOptions().max_depth_change; ///< of the map
   int frames = 40;
   double step_m = 0.1;
   int stride = 2; ///< of pixels
