@@ -16,7 +16,10 @@ if(HOLDFAST_QUICKSTART)
 endif()
 
 set(quickstart_without
-  src/simulation/ src/evaluation/ src/fusion/ src/contact/ src/sensor/noise_calibration
+  src/simulation/ src/evaluation/ src/contact/ src/sensor/noise_calibration
+  src/fusion/jet.cpp src/fusion/map_query src/fusion/measurement src/fusion/patch_map
+  src/fusion/pattern_reach src/fusion/registration src/fusion/roughness
+  src/fusion/support_grid
   src/sensor/pattern_calibration
   src/uncertainty/stagewise src/uncertainty/second_order
   src/pcl/frame_extraction src/pcl/frame_mapping src/pcl/map_conversions

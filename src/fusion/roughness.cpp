@@ -42,30 +42,6 @@ shiftOfJet(const Eigen::Vector2d& u, const Eigen::Matrix2d& W)
 
 } // namespace
 
-const Eigen::Matrix4d&
-unitThirdDerivatives()
-{
-  // clang-format off
-  static const Eigen::Matrix4d S = (Eigen::Matrix4d() <<
-      1.0, 0.0, 0.2, 0.0,
-      0.0, 0.2, 0.0, 0.2,
-      0.2, 0.0, 0.2, 0.0,
-      0.0, 0.2, 0.0, 1.0).finished();
-  // clang-format on
-  return S;
-}
-
-ThirdToJet
-thirdToJetOfDisc(double radius_m)
-{
-  // A cubic term goes into a slope as far as it correlates with it over the disc:
-  // E[x^4]/6 E[x^2] = E[x^2 y^2]/2 E[y^2] = radius^2/12.
-  const double a = radius_m * radius_m / 12.0;
-  ThirdToJet B = ThirdToJet::Zero();
-  B(1, 0) = B(1, 2) = B(2, 1) = B(2, 3) = a;
-  return B;
-}
-
 FitDesign
 designOf(const PointBatch& batch, const Pose& anchor)
 {
@@ -101,13 +77,6 @@ movedThirdToJet(const ThirdToJet& own, const Pose& pose)
   const Eigen::Vector2d u = pose.c.head<2>();
   const Eigen::Matrix2d W = pose.R.topLeftCorner<2, 2>();
   return shiftOfThird(u) + shiftOfJet(u, W) * own * turnOfThird(W);
-}
-
-JetMatrix
-modelError(const ThirdToJet& one, const ThirdToJet& other, double s3_per_m2)
-{
-  const ThirdToJet B = one - other;
-  return s3_per_m2 * s3_per_m2 * (B * unitThirdDerivatives() * B.transpose());
 }
 
 } // namespace holdfast
