@@ -63,10 +63,13 @@ struct PatchMapOptions {
   int conflicts_to_replace = 3;
   /// How far the errors that pixels share reach over the view (patternReach()). What of
   /// them is left when a spot has moved over it is the same error; once that is next to
-  /// nothing, or its depth has changed by max_depth_change, the view is independent.
-  /// Measurements without a pattern are independent always.
+  /// nothing, the view is independent. Measurements without a pattern are independent
+  /// always.
   std::vector<PatternReach> pattern = singleWave(0.05);
-  double max_depth_change = 0.05;
+  /// Share of the depth by which that must change for the pattern to be another one.
+  /// What a camera's pixels have as their own stays at any depth; where the rest is
+  /// known to change with it, a smaller share lets more views count (FUSION 3: 0.05).
+  double max_depth_change = 1.0;
   /// Patches further from the sensor are forgotten, and those whose height is no longer
   /// known to max_height_sigma_m.
   double volume_radius_m = 10.0;
