@@ -149,8 +149,8 @@ mapWithOdometry(const std::string& scene, int least_views, std::uint64_t walk_nu
 }
 
 /// Of several walks. Patches of one walk share the errors of its poses, so that its
-/// NEES/dof scatters by 0.25 however many patches there are (16 walks over rocks); the
-/// mean of this many by half of that.
+/// NEES/dof scatters however many patches there are; the mean of this many by half of
+/// that.
 Mapped
 meanOfWalks(const std::string& scene, int least_views)
 {
