@@ -155,12 +155,8 @@ expectDepartures(test::Random& random, DiscCase& c)
     }
   std::vector<float> departures(depth.size());
   discChords(c.disc, c.seed, c.window, c.chords.data());
-  surfaceDepartures(c.disc,
-                    c.seed,
-                    {depth.data(), kWidth},
-                    c.window.rows,
-                    c.chords.data(),
-                    gate,
+  surfaceDepartures({c.disc, c.seed, {depth.data(), kWidth}, gate},
+                    {c.window.rows, c.chords.data()},
                     departures.data(),
                     kWidth);
   for (int v = c.window.rows.begin; v < c.window.rows.end; ++v) {

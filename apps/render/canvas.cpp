@@ -76,16 +76,15 @@ Canvas::clip(const Frame& frame)
 /// \param nearnessAt of a sample at (x, y); NaN where the shape does not cover it.
 template <typename NearnessAt>
 void
-Canvas::fill(double left,
-             double top,
-             double right,
-             double bottom,
+Canvas::fill(const Box& box,
              const NearnessAt& nearnessAt,
              const Rgb& color,
              double opacity)
 {
-  const auto [first_u, end_u] = sampleRange(left, right, clip_.left, clip_.right);
-  const auto [first_v, end_v] = sampleRange(top, bottom, clip_.top, clip_.bottom);
+  const auto [first_u, end_u] =
+      sampleRange(box.left, box.right, clip_.left, clip_.right);
+  const auto [first_v, end_v] =
+      sampleRange(box.top, box.bottom, clip_.top, clip_.bottom);
   for (int v = first_v; v < end_v; ++v)
     for (int u = first_u; u < end_u; ++u) {
       const double nearness = nearnessAt((u + 0.5) / kSamples, (v + 0.5) / kSamples);
@@ -126,10 +125,9 @@ Canvas::drawLine(const ScreenPoint& from,
                from.nearness :
                from.nearness + t * (to.nearness - from.nearness);
   };
-  fill(std::min(from.x, to.x) - radius,
-       std::min(from.y, to.y) - radius,
-       std::max(from.x, to.x) + radius,
-       std::max(from.y, to.y) + radius,
+  const auto [left, right] = std::minmax({from.x, to.x});
+  const auto [top, bottom] = std::minmax({from.y, to.y});
+  fill({left - radius, top - radius, right + radius, bottom + radius},
        nearnessAt,
        color);
 }
@@ -153,17 +151,18 @@ Canvas::drawTriangle(const std::array<ScreenPoint, 3>& corners,
   };
   const auto [left, right] = std::minmax({a.x, b.x, c.x});
   const auto [top, bottom] = std::minmax({a.y, b.y, c.y});
-  fill(left, top, right, bottom, nearnessAt, color, opacity);
+  fill({left, top, right, bottom}, nearnessAt, color, opacity);
 }
 
 void
 Canvas::drawRectangle(const Frame& frame, const Rgb& color)
 {
+  const Box box{static_cast<double>(frame.left),
+                static_cast<double>(frame.top),
+                static_cast<double>(frame.right),
+                static_cast<double>(frame.bottom)};
   fill(
-      frame.left,
-      frame.top,
-      frame.right,
-      frame.bottom,
+      box,
       [](double, double) { return kInFront; },
       color);
 }

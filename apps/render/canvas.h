@@ -88,11 +88,11 @@ public:
   void writePng(std::ostream& out) const;
 
 private:
+  struct Box {
+    double left, top, right, bottom;
+  };
   template <typename NearnessAt>
-  void fill(double left,
-            double top,
-            double right,
-            double bottom,
+  void fill(const Box& box,
             const NearnessAt& nearnessAt,
             const Rgb& color,
             double opacity = 1.0);

@@ -152,14 +152,19 @@ projectAll(const View& view,
   return points;
 }
 
+/// How the triangles of a mesh are drawn.
+struct MeshPaint {
+  Rgb color;
+  double opacity = 1.0;
+  std::function<bool(const Eigen::Vector3d&)> is_drawn = {}; ///< by its middle
+};
+
 void
 drawMesh(Canvas& canvas,
          const View& view,
          const Mesh& mesh,
          const std::vector<ScreenPoint>& points,
-         const Rgb& color,
-         double opacity,
-         const std::function<bool(const Eigen::Vector3d&)>& is_drawn = {})
+         const MeshPaint& paint)
 {
   for (const std::array<int, 3>& triangle : mesh.triangles) {
     std::array<Eigen::Vector3d, 3> corners;
@@ -168,13 +173,13 @@ drawMesh(Canvas& canvas,
       corners[i] = mesh.vertices[static_cast<std::size_t>(triangle[i])];
       on_canvas[i] = points[static_cast<std::size_t>(triangle[i])];
     }
-    if (is_drawn && !is_drawn((corners[0] + corners[1] + corners[2]) / 3.0))
+    if (paint.is_drawn && !paint.is_drawn((corners[0] + corners[1] + corners[2]) / 3.0))
       continue;
     const Eigen::Vector3d normal =
         (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalized();
     canvas.drawTriangle(on_canvas,
-                        scaled(color, 0.55 + 0.5 * view.brightness(normal)),
-                        opacity);
+                        scaled(paint.color, 0.55 + 0.5 * view.brightness(normal)),
+                        paint.opacity);
   }
 }
 
@@ -300,9 +305,10 @@ drawPatch(Canvas& canvas,
   if (!points)
     return;
   const Pose pose = patch.pose();
-  drawMesh(canvas, view, mesh, *points, color, kOpacity, [&](const Eigen::Vector3d& p) {
+  const auto isSupported = [&](const Eigen::Vector3d& p) {
     return support.contains(pose.toLocal(p).head<2>());
-  });
+  };
+  drawMesh(canvas, view, mesh, *points, {color, kOpacity, isSupported});
   if (edge == PatchEdge::Line)
     drawOutline(canvas, *points, outlineLength(patch, spacing), scaled(color, 0.6));
 }
@@ -316,7 +322,7 @@ drawSolidPatch(Canvas& canvas, const View& view, const Patch& patch, const Rgb& 
   const auto edge = projectAll(view, mesh.vertices, kLineStandOff * halfLength(patch));
   if (!sheet || !edge)
     return;
-  drawMesh(canvas, view, mesh, *sheet, color, 1.0);
+  drawMesh(canvas, view, mesh, *sheet, {color});
   for (const Eigen::Index axis : {0, 1})
     drawGridLines(canvas, view, patch, axis, scaled(color, 0.75));
   drawOutline(canvas, *edge, outlineLength(patch, spacing), scaled(color, 0.5));

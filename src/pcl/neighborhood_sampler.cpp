@@ -216,9 +216,7 @@ NeighborhoodSampler::Impl::patch(int seed,
   if (grid) {
     const double sigma = depthSigma(seed);
     surfacePatch(*grid,
-                 seed,
-                 jumpLimit(seed, sigma),
-                 sigma,
+                 {seed, jumpLimit(seed, sigma), sigma},
                  settings,
                  scratch.patch,
                  indices);

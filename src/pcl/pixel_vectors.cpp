@@ -138,22 +138,19 @@ private:
 };
 
 void
-dispatchedDepartures(const LateralDisc& disc,
-                     const SeedPixel& seed,
-                     const PixelRows& depth,
-                     const PixelRange& rows,
-                     const PixelRange* chords,
-                     float gate,
+dispatchedDepartures(const DiscOverPixels& over,
+                     const PixelChords& chords,
                      float* departures,
                      std::ptrdiff_t stride)
 {
-  const RowOfDisc row(disc, seed, gate);
-  for (int v = rows.begin; v < rows.end; ++v, ++chords)
-    row.departures(chords->begin - seed.u,
-                   v - seed.v,
-                   chords->end - chords->begin,
-                   depth.row(v) + chords->begin,
-                   departures + v * stride + chords->begin);
+  const RowOfDisc row(over.disc, over.seed, over.gate);
+  const PixelRange* chord = chords.columns;
+  for (int v = chords.rows.begin; v < chords.rows.end; ++v, ++chord)
+    row.departures(chord->begin - over.seed.u,
+                   v - over.seed.v,
+                   chord->end - chord->begin,
+                   over.depth.row(v) + chord->begin,
+                   departures + v * stride + chord->begin);
 }
 
 template <typename Mask>
@@ -289,17 +286,12 @@ discChords(const LateralDisc& disc,
 }
 
 void
-surfaceDepartures(const LateralDisc& disc,
-                  const SeedPixel& seed,
-                  const PixelRows& depth,
-                  const PixelRange& rows,
-                  const PixelRange* chords,
-                  float gate,
+surfaceDepartures(const DiscOverPixels& over,
+                  const PixelChords& chords,
                   float* departures,
                   std::ptrdiff_t stride)
 {
-  HWY_DYNAMIC_DISPATCH(dispatchedDepartures)
-  (disc, seed, depth, rows, chords, gate, departures, stride);
+  HWY_DYNAMIC_DISPATCH(dispatchedDepartures)(over, chords, departures, stride);
 }
 
 void
@@ -360,23 +352,21 @@ discChords(const LateralDisc& disc,
 }
 
 void
-surfaceDepartures(const LateralDisc& disc,
-                  const SeedPixel& seed,
-                  const PixelRows& depth,
-                  const PixelRange& rows,
-                  const PixelRange* chords,
-                  float gate,
+surfaceDepartures(const DiscOverPixels& over,
+                  const PixelChords& chords,
                   float* departures,
                   std::ptrdiff_t stride)
 {
-  const ReferenceSurface& surface = disc.surface();
-  for (int v = rows.begin; v < rows.end; ++v, ++chords) {
-    const double t = (v - seed.v) / seed.fy;
-    for (int u = chords->begin; u < chords->end; ++u) {
-      const double s = (u - seed.u) / seed.fx, rho = surface.inverseDepth(s, t);
-      const auto departure = static_cast<float>(1.0 / depth.row(v)[u] - rho);
-      const bool belongs = std::abs(departure) <= gate && rho > 0.0 &&
-                           (surface.isPlane() || disc.excess(s, t, rho) <= 0.0);
+  const ReferenceSurface& surface = over.disc.surface();
+  const PixelRange* chord = chords.columns;
+  for (int v = chords.rows.begin; v < chords.rows.end; ++v, ++chord) {
+    const double t = (v - over.seed.v) / over.seed.fy;
+    for (int u = chord->begin; u < chord->end; ++u) {
+      const double s = (u - over.seed.u) / over.seed.fx;
+      const double rho = surface.inverseDepth(s, t);
+      const auto departure = static_cast<float>(1.0 / over.depth.row(v)[u] - rho);
+      const bool belongs = std::abs(departure) <= over.gate && rho > 0.0 &&
+                           (surface.isPlane() || over.disc.excess(s, t, rho) <= 0.0);
       departures[v * stride + u] =
           belongs ? departure : std::numeric_limits<float>::quiet_NaN();
     }

@@ -48,15 +48,25 @@ void discChords(const LateralDisc& disc,
                 const PixelWindow& window,
                 PixelRange* chords);
 
+/// A disc on a surface before the pixels that may be of it.
+struct DiscOverPixels {
+  const LateralDisc& disc;
+  SeedPixel seed;
+  PixelRows depth; ///< z of pixels, m
+  float gate; ///< what is further off the surface is no part of it, 1/m
+};
+
+/// Parts of the rows of a window, one for each.
+struct PixelChords {
+  PixelRange rows;
+  const PixelRange* columns; ///< that of row v is columns[v - rows.begin]
+};
+
 /// By how much 1/z of the pixels of the chords leaves the disc's surface; NaN where
-/// they are no part of it: further off than the gate (1/m), or outside the disc.
-/// \param departures of the window, in rows of `stride`.
-void surfaceDepartures(const LateralDisc& disc,
-                       const SeedPixel& seed,
-                       const PixelRows& depth,
-                       const PixelRange& rows,
-                       const PixelRange* chords,
-                       float gate,
+/// they are no part of it: further off than the gate, or outside the disc.
+/// \param departures of row v and column u at departures[v * stride + u].
+void surfaceDepartures(const DiscOverPixels& over,
+                       const PixelChords& chords,
                        float* departures,
                        std::ptrdiff_t stride);
 

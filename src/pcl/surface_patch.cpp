@@ -108,12 +108,9 @@ public:
                          static_cast<std::ptrdiff_t>(window.rows.begin) * columns;
     const SeedPixel seed{u0_, v0_, grid_.camera.fx, grid_.camera.fy};
     discChords(about, seed, window, chords);
-    surfaceDepartures(disc,
-                      seed,
-                      grid_.rows(),
-                      window.rows,
-                      chords,
-                      static_cast<float>(departure_m / (depth_ * depth_)),
+    const auto gate = static_cast<float>(departure_m / (depth_ * depth_));
+    surfaceDepartures({disc, seed, grid_.rows(), gate},
+                      {window.rows, chords},
                       first,
                       columns);
     PixelRuns connected({first, columns}, jump(), scratch_.runs);
@@ -164,25 +161,23 @@ private:
 
 void
 surfacePatch(const PixelGrid& grid,
-             int seed,
-             const JumpLimit& limit,
-             double sigma_z,
+             const SurfaceSeed& seed,
              const SurfacePatchSettings& settings,
              SurfacePatchScratch& scratch,
              std::vector<int>& indices)
 {
   const double radius = settings.radius_m;
-  const double depth = grid.depth[static_cast<std::size_t>(seed)];
+  const double depth = grid.depth[static_cast<std::size_t>(seed.pixel)];
   const double pixel = depth / std::min(grid.camera.fx, grid.camera.fy);
-  Search search(grid, seed, sigma_z, settings, scratch);
+  Search search(grid, seed.pixel, seed.sigma_z, settings, scratch);
   connectedDisc(grid,
-                seed,
+                seed.pixel,
                 std::max(kFirstShare * radius, kFirstPixels * pixel),
-                limit,
+                seed.limit,
                 scratch.runs,
                 scratch.pixels);
   search.fitPlane(scratch.pixels);
-  const double departure = largestDeparture(settings, sigma_z);
+  const double departure = largestDeparture(settings, seed.sigma_z);
   search.collect(fittedRadius(settings),
                  std::max(kLargestDeparture * radius, departure),
                  scratch.pixels);
@@ -190,7 +185,7 @@ surfacePatch(const PixelGrid& grid,
   search.collect(radius, departure, indices);
   // The seed itself may be an outlier of its surface.
   if (indices.empty())
-    indices.push_back(seed);
+    indices.push_back(seed.pixel);
 }
 
 namespace {

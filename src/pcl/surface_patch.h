@@ -31,19 +31,20 @@ struct SurfacePatchScratch {
   std::vector<PixelRange> chords; ///< of the rows of the window
 };
 
+struct SurfaceSeed {
+  int pixel; ///< a valid one
+  JumpLimit limit; ///< at the seed, for the pixels nearest to it
+  double sigma_z; ///< of a point at the seed, m
+};
+
 /// Replaces `indices` by the pixels whose rays meet the seed's surface within the
 /// radius and whose points continue it, connected to the seed; ascending.
 ///
 /// The surface is found from the pixels nearest the seed, as a plane, then from those
 /// within the radius, as a quadric. Points continue it whose depths leave it together
 /// with their neighbours', within the noise and a slope of 45 degrees against it.
-/// \param seed index of a valid pixel.
-/// \param limit at the seed, for the pixels nearest to it.
-/// \param sigma_z of a point at the seed, m.
 void surfacePatch(const PixelGrid& grid,
-                  int seed,
-                  const JumpLimit& limit,
-                  double sigma_z,
+                  const SurfaceSeed& seed,
                   const SurfacePatchSettings& settings,
                   SurfacePatchScratch& scratch,
                   std::vector<int>& indices);
