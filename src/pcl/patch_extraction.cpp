@@ -313,30 +313,35 @@ attemptAt(const Seed& seed,
   return patch;
 }
 
-/// One attempt per seed in their order, until the budget is spent.
-/// \param attempts whose memory is used, whatever they are of
-/// \param supports the points of each attempt, where they are asked for
-void
+/// What came of the seeds, in their order.
+struct Attempts {
+  std::vector<ExtractedPatch> patches;
+  std::vector<std::vector<int>> supports; ///< their points, where overlap counts
+};
+
+/// One attempt per seed, until the budget is spent.
+/// \param memory to be used, whatever patches are in it
+Attempts
 attemptAll(const CompleteSites& sites,
            const PatchMaker& maker,
            const ExtractionOptions& options,
            const PatchObserver& observe,
            SamplingBudget& budget,
-           std::vector<ExtractedPatch>& attempts,
-           std::vector<std::vector<int>>& supports)
+           std::vector<ExtractedPatch> memory)
 {
-  const bool keep_supports = options.max_overlap < 1.0;
+  const std::size_t seeds = sites.seeds.size();
+  const std::size_t kept = options.max_overlap < 1.0 ? seeds : 0;
+  Attempts attempts{std::move(memory), std::vector<std::vector<int>>(kept)};
+  attempts.patches.resize(seeds);
   std::vector<Workspace> workspaces(
       static_cast<std::size_t>(threadCount(options.threads)));
-  attempts.resize(sites.seeds.size());
   // The points of attempts that wait to be looked at, where covered area counts.
-  std::vector<std::vector<int>> covered(budget.limitsArea() ? attempts.size() : 0);
-  supports.resize(keep_supports ? attempts.size() : 0);
-  InOrder count(attempts.size(), [&](std::size_t i) {
+  std::vector<std::vector<int>> covered(budget.limitsArea() ? seeds : 0);
+  InOrder count(seeds, [&](std::size_t i) {
     const std::vector<int> points =
         covered.empty() ? std::vector<int>() : std::move(covered[i]);
-    if (isAccepted(attempts[i]))
-      budget.cover(points, projectedArea(attempts[i].fit.patch));
+    if (isAccepted(attempts.patches[i]))
+      budget.cover(points, projectedArea(attempts.patches[i].fit.patch));
     return budget.isFull();
   });
   // Once it is, the seeds that are left do not each ask what time it is.
@@ -347,23 +352,21 @@ attemptAll(const CompleteSites& sites,
       return;
     }
     const auto i = static_cast<std::size_t>(item);
-    const Seed& seed = sites.seeds[i];
+    ExtractedPatch& patch = attempts.patches[i];
     Workspace& work = workspaces[static_cast<std::size_t>(thread)];
-    attempts[i] = attemptAt(seed, thread, sites, maker, work);
-    if (observe && isAccepted(attempts[i]))
-      observe(i, attempts[i], work.batch);
+    patch = attemptAt(sites.seeds[i], thread, sites, maker, work);
+    if (observe && isAccepted(patch))
+      observe(i, patch, work.batch);
     if (!covered.empty())
       covered[i] = work.indices;
-    if (keep_supports)
-      supports[i] = work.indices;
+    if (kept > 0)
+      attempts.supports[i] = work.indices;
     count.finish(i);
   };
-  parallelFor(static_cast<int>(attempts.size()),
-              options.threads,
-              attempt,
-              options.progress);
-  attempts.resize(count.seen());
-  supports.resize(keep_supports ? attempts.size() : 0);
+  parallelFor(static_cast<int>(seeds), options.threads, attempt, options.progress);
+  attempts.patches.resize(count.seen());
+  attempts.supports.resize(std::min(kept, count.seen()));
+  return attempts;
 }
 
 /// True when all seeds are tried and the best patches are taken, since nothing but
@@ -375,17 +378,24 @@ takesBest(const SamplerOptions& sampler, const PatchSites& asked)
          sampler.max_time_s == 0.0;
 }
 
+SamplerOptions
+limitsOf(const SamplerOptions& sampler, const PatchSites& asked)
+{
+  return takesBest(sampler, asked) ? withoutLimits(sampler) : sampler;
+}
+
 /// Leaves out what overlaps, then what is too many.
+/// \param points in the cloud
 void
 choose(const ExtractionOptions& options,
        const PatchSites& asked,
-       const std::vector<std::vector<int>>& supports,
        std::size_t points,
-       std::vector<ExtractedPatch>& attempts,
+       Attempts& attempts,
        std::vector<std::string>& notices)
 {
   if (options.max_overlap < 1.0) {
-    const int left_out = thinOut(options.max_overlap, supports, points, attempts);
+    const int left_out =
+        thinOut(options.max_overlap, attempts.supports, points, attempts.patches);
     if (left_out > 0)
       notices.push_back(
           fmt::format("{} patches are left out, since better ones have their points",
@@ -396,7 +406,7 @@ choose(const ExtractionOptions& options,
   const SamplerOptions& sampler = options.sampler;
   const int left_out = keepBest(static_cast<std::size_t>(sampler.max_patches),
                                 sampler.spacing_m,
-                                attempts);
+                                attempts.patches);
   if (left_out > 0)
     notices.push_back(fmt::format("the best {} of {} patches are given",
                                   sampler.max_patches,
@@ -440,14 +450,25 @@ resultOf(const PointSelection& chosen, const ExtractionOptions& options)
   return result;
 }
 
+/// That not all seeds were tried, or why no patch was found.
 void
-noteLimit(std::size_t tried, std::size_t seeds, std::vector<std::string>& notices)
+noteWhatIsMissing(std::size_t tried,
+                  const PatchSites& asked,
+                  const CompleteSites& sites,
+                  const PointSelection& chosen,
+                  const SamplerOptions& sampler,
+                  ExtractionResult& result)
 {
-  if (tried < seeds)
-    notices.push_back(fmt::format("stopped at the limit of patches, area or time after "
-                                  "{} of {} seeds",
-                                  tried,
-                                  seeds));
+  const bool all_tried = tried == sites.seeds.size();
+  if (!asked.seeds && !all_tried)
+    result.notices.push_back(fmt::format(
+        "stopped at the limit of patches, area or time after {} of {} seeds",
+        tried,
+        sites.seeds.size()));
+  // A stream has no time to measure an empty frame.
+  const bool is_stream = asked.seeds && isLimited(sampler);
+  if (sites.promising && all_tried && !is_stream)
+    adviseOnNoPatches(chosen, sampler, result);
 }
 
 } // namespace
@@ -482,33 +503,23 @@ extractPatches(const RangeCloud& cloud,
 {
   const auto start = SamplingBudget::Clock::now();
   requireValid(options);
-  // Cloud -> points that can be used -> covariance of each -> seeds and neighbourhoods
-  // -> weighted fit -> bounded patch with covariance -> validation.
+  // Cloud -> points that can be used, each with its covariance -> seeds and
+  // neighbourhoods -> weighted fit -> bounded patch with covariance -> validation.
   const PointSelection chosen = selectPoints(cloud, sensor);
+  const std::size_t points = chosen.cloud.points->size();
   ExtractionResult result = resultOf(chosen, options);
-  const PatchMaker maker(chosen, options);
   const CompleteSites sites = completeSites(asked, options, chosen, result.notices);
-  const SamplerOptions limits = takesBest(options.sampler, asked) ?
-                                    withoutLimits(options.sampler) :
-                                    options.sampler;
-  SamplingBudget budget(limits, chosen.cloud.points->size(), start);
-  std::vector<std::vector<int>> supports;
-  std::vector<ExtractedPatch> attempts = std::move(former.patches);
-  attemptAll(sites, maker, options, asked.observe, budget, attempts, supports);
-  const bool all_tried = attempts.size() == sites.seeds.size();
-  if (!asked.seeds)
-    noteLimit(attempts.size(), sites.seeds.size(), result.notices);
-  choose(options,
-         asked,
-         supports,
-         chosen.cloud.points->size(),
-         attempts,
-         result.notices);
-  sortOut(std::move(attempts), options, result);
-  // A stream has no time to measure an empty frame.
-  const bool is_stream = asked.seeds && isLimited(options.sampler);
-  if (sites.promising && all_tried && !is_stream)
-    adviseOnNoPatches(chosen, options.sampler, result);
+  SamplingBudget budget(limitsOf(options.sampler, asked), points, start);
+  Attempts attempts = attemptAll(sites,
+                                 PatchMaker(chosen, options),
+                                 options,
+                                 asked.observe,
+                                 budget,
+                                 std::move(former.patches));
+  const std::size_t tried = attempts.patches.size();
+  choose(options, asked, points, attempts, result.notices);
+  sortOut(std::move(attempts.patches), options, result);
+  noteWhatIsMissing(tried, asked, sites, chosen, options.sampler, result);
   return result;
 }
 
