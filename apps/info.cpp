@@ -4,6 +4,8 @@
 #include "console.h"
 #include "input_options.h"
 
+#include "io/json_parts.h"
+
 #include <holdfast/io/atomic_file.h>
 #include <holdfast/io/config.h>
 #include <holdfast/io/names.h>
@@ -149,27 +151,13 @@ factsAbout(const std::string& path,
   return facts;
 }
 
-Json
-poseJson(const Pose& pose)
-{
-  const Eigen::Quaterniond q(pose.R);
-  return {{"position", {pose.c.x(), pose.c.y(), pose.c.z()}},
-          {"orientation_wxyz", {q.w(), q.x(), q.y(), q.z()}}};
-}
-
-Json
-cameraJson(const Camera& camera)
-{
-  return {{"fx", camera.fx}, {"fy", camera.fy}, {"cx", camera.cx}, {"cy", camera.cy}};
-}
-
 /// The camera that the points themselves show.
 Json
 recoveredJson(const CloudFacts& facts)
 {
   if (!facts.camera)
     return {};
-  Json json = cameraJson(*facts.camera);
+  Json json = io::cameraJson(*facts.camera);
   json["rms_px"] = facts.camera_rms_px;
   return json;
 }
@@ -183,31 +171,31 @@ factsJson(const CloudFacts& facts)
   if (facts.has_covariances)
     covariances = {{"valid", facts.valid - facts.invalid_covariances},
                    {"invalid", facts.invalid_covariances}};
-  return {
-      {"cloud", facts.path},
-      {"format", facts.file.format},
-      {"width", facts.width},
-      {"height", facts.height},
-      {"organized", facts.height > 1},
-      {"fields", facts.file.fields},
-      {"valid_points", facts.valid},
-      {"invalid_points", facts.width * facts.height - facts.valid},
-      {"nan_share", facts.invalidShare()},
-      {"zero_points", facts.file.zero_points},
-      {"out_of_range_pixels", facts.file.out_of_range_pixels},
-      {"min", {low.x(), low.y(), low.z()}},
-      {"max", {high.x(), high.y(), high.z()}},
-      {"depth_range", {facts.nearest_m, facts.farthest_m}},
-      {"unit_m", facts.file.unit_m},
-      {"axes", kCloudAxesNames.of(facts.file.axes)},
-      {"offset", {facts.offset.x(), facts.offset.y(), facts.offset.z()}},
-      {"camera", facts.file.camera ? cameraJson(*facts.file.camera) : Json()},
-      {"viewpoint", facts.file.viewpoint ? poseJson(*facts.file.viewpoint) : Json()},
-      {"sensor_pose", poseJson(facts.sensor_pose)},
-      {"intrinsics", recoveredJson(facts)},
-      {"sensors", facts.sensors},
-      {"covariances", covariances},
-      {"notices", facts.file.notices}};
+  return {{"cloud", facts.path},
+          {"format", facts.file.format},
+          {"width", facts.width},
+          {"height", facts.height},
+          {"organized", facts.height > 1},
+          {"fields", facts.file.fields},
+          {"valid_points", facts.valid},
+          {"invalid_points", facts.width * facts.height - facts.valid},
+          {"nan_share", facts.invalidShare()},
+          {"zero_points", facts.file.zero_points},
+          {"out_of_range_pixels", facts.file.out_of_range_pixels},
+          {"min", {low.x(), low.y(), low.z()}},
+          {"max", {high.x(), high.y(), high.z()}},
+          {"depth_range", {facts.nearest_m, facts.farthest_m}},
+          {"unit_m", facts.file.unit_m},
+          {"axes", kCloudAxesNames.of(facts.file.axes)},
+          {"offset", {facts.offset.x(), facts.offset.y(), facts.offset.z()}},
+          {"camera", facts.file.camera ? io::cameraJson(*facts.file.camera) : Json()},
+          {"viewpoint",
+           facts.file.viewpoint ? io::poseJson(*facts.file.viewpoint) : Json()},
+          {"sensor_pose", io::poseJson(facts.sensor_pose)},
+          {"intrinsics", recoveredJson(facts)},
+          {"sensors", facts.sensors},
+          {"covariances", covariances},
+          {"notices", facts.file.notices}};
 }
 
 std::string

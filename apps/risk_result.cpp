@@ -1,13 +1,12 @@
 #include "risk_result.h"
 
 #include "io/input_json.h"
+#include "io/json_parts.h"
 
 #include <holdfast/contact/names.h>
 #include <holdfast/fit/options.h>
 #include <holdfast/patch/names.h>
 #include <holdfast/patch/parameters.h>
-
-#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <limits>
@@ -19,31 +18,6 @@ namespace holdfast::app {
 namespace {
 
 using Json = nlohmann::json;
-
-template <int n>
-Eigen::Matrix<double, n, 1>
-vectorFrom(const Json& json)
-{
-  if (!json.is_array() || json.size() != n)
-    throw std::runtime_error("has a vector of another length than " +
-                             std::to_string(n));
-  Eigen::Matrix<double, n, 1> v;
-  for (int i = 0; i < n; ++i)
-    v[i] = json.at(static_cast<std::size_t>(i)).get<double>();
-  if (!v.allFinite())
-    throw std::runtime_error("has a vector that is not finite");
-  return v;
-}
-
-Pose
-poseFrom(const Json& json, const Eigen::Vector3d& offset)
-{
-  const Eigen::Vector4d q = vectorFrom<4>(json.at("orientation_wxyz"));
-  if (!(q.norm() > 0.5))
-    throw std::runtime_error("has a pose without orientation");
-  return {Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized().toRotationMatrix(),
-          vectorFrom<3>(json.at("position")) - offset};
-}
 
 /// Degenerate where the map knows too little of it.
 FitResult
@@ -109,7 +83,7 @@ footholdFrom(const Json& json, const Eigen::Vector3d& offset)
   foothold.risk.status = ContactStatus::Ok;
   foothold.risk.support_share = numberFrom(json, "support_share");
   ContactQuality quality;
-  quality.pose = poseFrom(json.at("pose"), offset);
+  quality.pose = io::poseFromJson(json.at("pose"), offset);
   const Json& risk = json.at("risk");
   ContactEvents& events = quality.risk;
   events.total = risk.at("total").get<double>();
@@ -167,8 +141,8 @@ resultFrom(Json json)
   RiskResult result;
   result.source = json.at("source").get<std::string>();
   result.is_of_map = json.at("frame").get<std::string>() == "map";
-  result.offset = vectorFrom<3>(json.at("offset"));
-  result.sensor_pose = poseFrom(json.at("sensor"), result.offset);
+  result.offset = io::vectorFromJson<3>(json.at("offset"));
+  result.sensor_pose = io::poseFromJson(json.at("sensor"), result.offset);
   if (const auto input = json.find("input"); input != json.end())
     result.file = io::inputFromJson(*input);
   result.radius_m = json.value("radius_m", 0.0);
@@ -176,7 +150,7 @@ resultFrom(Json json)
     result.patches.push_back(triedFrom(tried, result));
   std::vector<Eigen::Vector2d> corners;
   for (const Json& corner : json.at("foot").at("sole_m"))
-    corners.emplace_back(vectorFrom<2>(corner));
+    corners.emplace_back(io::vectorFromJson<2>(corner));
   if (corners.size() < 3)
     throw std::runtime_error("has a sole of fewer than three corners");
   for (const Json& foothold : json.at("footholds")) {
@@ -206,7 +180,7 @@ readRiskResult(const std::string& text)
     json = Json::parse(text);
   }
   catch (const Json::exception& error) {
-    throw std::runtime_error(std::string("is no JSON: ") + error.what());
+    throw std::runtime_error(std::string("is not JSON: ") + error.what());
   }
   try {
     return resultFrom(std::move(json));

@@ -348,7 +348,9 @@ TEST_F(ReportProgram, BadResultsAreNamed)
   expectError(1,
               {write("bad.json", impossible.dump())},
               "bad.json: has an impossible patch");
-  expectError(1, {write("turned.json", turned.dump())}, "turned.json: no result");
+  expectError(1,
+              {write("turned.json", turned.dump())},
+              "turned.json: has a vector of another length than 3");
   expectError(1, {result, "--cloud", result}, "bowl.patches.json: is neither PCD");
   expectError(1, {result, "--cloud", folder_ + "/no.pcd"}, "no.pcd: no such file");
 }

@@ -1,12 +1,12 @@
 #include "risk/risk_report.h"
 
 #include "io/input_json.h"
+#include "io/json_parts.h"
 
 #include <holdfast/contact/names.h>
 #include <holdfast/patch/names.h>
 #include <holdfast/patch/parameters.h>
 
-#include <Eigen/Geometry>
 #include <nlohmann/json.hpp>
 
 #include <utility>
@@ -16,30 +16,12 @@ namespace {
 
 using Json = nlohmann::ordered_json; // NaN becomes null
 
-template <typename Vector>
-Json
-vectorJson(const Vector& v)
-{
-  Json numbers = Json::array();
-  for (Eigen::Index i = 0; i < v.size(); ++i)
-    numbers.push_back(v[i] + 0.0); // -0 becomes 0
-  return numbers;
-}
-
-Json
-poseJson(const Pose& pose, const Eigen::Vector3d& offset)
-{
-  const Eigen::Quaterniond q(pose.R);
-  return {{"position", vectorJson(Eigen::Vector3d(pose.c + offset))},
-          {"orientation_wxyz", {q.w(), q.x(), q.y(), q.z()}}};
-}
-
 Json
 matrixJson(const JetMatrix& S)
 {
   Json rows = Json::array();
   for (Eigen::Index i = 0; i < S.rows(); ++i)
-    rows.push_back(vectorJson(S.row(i)));
+    rows.push_back(io::vectorJson(S.row(i)));
   return rows;
 }
 
@@ -48,13 +30,13 @@ footJson(const Foot& foot)
 {
   Json sole = Json::array();
   for (const Eigen::Vector2d& corner : foot.sole)
-    sole.push_back(vectorJson(corner));
+    sole.push_back(io::vectorJson(corner));
   const ContactTolerances& t = foot.tolerances;
   return {{"name", foot.name},
           {"sole_m", sole},
           {"reach_m", soleReach(foot)},
           {"area_m2", soleArea(foot)},
-          {"curvature_per_m", vectorJson(foot.curvature)},
+          {"curvature_per_m", io::vectorJson(foot.curvature)},
           {"ankle", kAnkleNames.of(foot.ankle)},
           {"friction", {{"mean", foot.friction.mean}, {"sigma", foot.friction.sigma}}},
           {"tolerances",
@@ -102,7 +84,7 @@ addType(const PatchMap& map, std::uint64_t id, Json& json)
     return;
   }
   json["type"] = kSurfaceNames.of(fit.patch.type.surface);
-  json["kappa"] = vectorJson(fit.patch.principalCurvatures());
+  json["kappa"] = io::vectorJson(fit.patch.principalCurvatures());
 }
 
 Json
@@ -110,7 +92,7 @@ footholdJson(const RiskReport& report, const Foothold& foothold)
 {
   const ContactQuality& quality = *foothold.risk.quality;
   Json json{{"patch", foothold.patch},
-            {"pose", poseJson(quality.pose, report.ground.offset)},
+            {"pose", io::poseJson(quality.pose, report.ground.offset)},
             {"pose_covariance", matrixJson(quality.pose_covariance)}};
   addType(report.ground.map, foothold.patch, json);
   json["risk"] = eventsJson(quality.risk);
@@ -140,7 +122,7 @@ patchJson(const RiskReport& report, const Foothold& tried)
   parameters.tail<3>() += report.ground.offset;
   json["surface"] = kSurfaceNames.of(fit.patch.type.surface);
   json["boundary"] = kBoundaryNames.of(fit.patch.type.boundary);
-  json["parameters"] = vectorJson(parameters);
+  json["parameters"] = io::vectorJson(parameters);
   return json;
 }
 
@@ -221,10 +203,10 @@ writeRiskJson(std::ostream& out, const RiskReport& report)
   const Ground& ground = report.ground;
   Json head{{"source", report.source},
             {"frame", ground.is_map_file ? "map" : "cloud"},
-            {"sensor", poseJson(ground.map.pose(), ground.offset)},
-            {"offset", vectorJson(ground.offset)},
+            {"sensor", io::poseJson(ground.map.pose(), ground.offset)},
+            {"offset", io::vectorJson(ground.offset)},
             {"radius_m", ground.radius_m},
-            {"load_direction", vectorJson(report.options.load_direction)},
+            {"load_direction", io::vectorJson(report.options.load_direction)},
             {"foot", footJson(report.foot)},
             {"options",
              {{"yaws", report.options.yaws}, {"spacing_m", report.options.spacing_m}}},

@@ -1,11 +1,11 @@
 #include "truth_json.h"
 
+#include "io/json_parts.h"
+
 #include <holdfast/io/atomic_file.h>
 #include <holdfast/patch/parameters.h>
 #include <holdfast/sensor/names.h>
 #include <holdfast/version.h>
-
-#include <Eigen/Geometry>
 
 #include <filesystem>
 
@@ -29,16 +29,6 @@ strided(const Camera& camera, const RayGrid& rays, int stride)
   return result;
 }
 
-template <typename Derived>
-Json
-numbers(const Eigen::MatrixBase<Derived>& vector)
-{
-  Json array = Json::array();
-  for (Eigen::Index i = 0; i < vector.size(); ++i)
-    array.push_back(vector[i]);
-  return array;
-}
-
 Json
 patchJson(const Patch& patch)
 {
@@ -46,7 +36,7 @@ patchJson(const Patch& patch)
           {"boundary", boundaryName(patch.type.boundary)},
           {"dof", degreesOfFreedom(patch.type)},
           {"names", parameterNames(patch.type)},
-          {"parameters", numbers(pack(patch))}};
+          {"parameters", io::vectorJson(pack(patch))}};
 }
 
 Json
@@ -62,17 +52,13 @@ shapeJson(const Shape& shape)
   return object;
 }
 
-/// The pattern that was drawn, as among the results of a fit: sigmas in the unit of the
-/// model, lengths in pixels of the image.
-Json
-patternJson(const NoisePattern& pattern, int stride)
+/// The pattern that was drawn, in pixels of the image.
+NoisePattern
+strided(NoisePattern pattern, int stride)
 {
-  Json waves = Json::array();
-  for (const PatternWave& wave : pattern.waves)
-    waves.push_back({{"sigma", wave.sigma},
-                     {"length_px", wave.length_px / stride},
-                     {"shape", kPatternShapeNames.of(wave.shape)}});
-  return waves;
+  for (PatternWave& wave : pattern.waves)
+    wave.length_px /= stride;
+  return pattern;
 }
 
 /// Without its pose.
@@ -83,14 +69,8 @@ sensorJson(const SimulatedView& view, int stride)
   const Camera camera = strided(sensor.camera, view.rays, stride);
   return {{"name", sensor.name},
           {"noise", sensor.noise->name()},
-          {"pattern", patternJson(sensor.pattern, stride)},
-          {"camera",
-           {{"width", camera.width},
-            {"height", camera.height},
-            {"fx", camera.fx},
-            {"fy", camera.fy},
-            {"cx", camera.cx},
-            {"cy", camera.cy}}}};
+          {"pattern", io::patternJson(strided(sensor.pattern, stride))},
+          {"camera", io::cameraJson(camera)}};
 }
 
 /// Everything but the clouds and where the sensor was.
@@ -121,10 +101,7 @@ truthJson(const SimulateArguments& arguments, const SimulatedView& view)
   Json json = {{"holdfast", HOLDFAST_VERSION},
                {"cloud", std::filesystem::path(arguments.output).filename().string()}};
   json.update(commonJson(arguments, view));
-  const Pose& pose = view.scene.sensor_pose;
-  const Eigen::Quaterniond q(pose.R);
-  json["sensor"]["position"] = numbers(pose.c);
-  json["sensor"]["orientation_wxyz"] = {q.w(), q.x(), q.y(), q.z()};
+  json["sensor"].update(io::poseJson(view.scene.sensor_pose));
   return json;
 }
 

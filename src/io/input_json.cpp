@@ -1,8 +1,9 @@
 #include "input_json.h"
 
+#include "json_parts.h"
+
 #include <holdfast/io/names.h>
 
-#include <cmath>
 #include <stdexcept>
 #include <string>
 
@@ -21,41 +22,7 @@ turnJson(const Eigen::Matrix3d& turn)
   return rows;
 }
 
-double
-positive(const nlohmann::json& json, const char* name)
-{
-  const double number = json.at(name).get<double>();
-  if (!(number > 0.0) || !std::isfinite(number))
-    throw std::runtime_error(std::string("no result of holdfast: ") + name +
-                             " of its input must be positive");
-  return number;
-}
-
-Camera
-cameraFromJson(const nlohmann::json& json)
-{
-  Camera camera;
-  camera.width = json.at("width");
-  camera.height = json.at("height");
-  camera.fx = positive(json, "fx");
-  camera.fy = positive(json, "fy");
-  camera.cx = json.at("cx");
-  camera.cy = json.at("cy");
-  return camera;
-}
-
 } // namespace
-
-Json
-cameraJson(const Camera& camera)
-{
-  return {{"width", camera.width},
-          {"height", camera.height},
-          {"fx", camera.fx},
-          {"fy", camera.fy},
-          {"cx", camera.cx},
-          {"cy", camera.cy}};
-}
 
 Json
 inputJson(const CloudFileInfo& file)
@@ -80,11 +47,11 @@ inputFromJson(const nlohmann::json& json)
   if (!known)
     throw std::runtime_error("no result of holdfast: unknown axes " + axes);
   file.axes = *known;
-  file.unit_m = positive(json, "unit_m");
+  file.unit_m = positiveFromJson(json, "unit_m");
   // Results of earlier versions do not have it.
   if (json.contains("depth_scale") && !json.at("depth_scale").is_null()) {
     file.is_depth_image = true;
-    file.depth_scale = positive(json, "depth_scale");
+    file.depth_scale = positiveFromJson(json, "depth_scale");
   }
   file.zero_points = json.value("zero_points", 0);
   file.out_of_range_pixels = json.value("out_of_range_pixels", 0);

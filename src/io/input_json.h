@@ -16,6 +16,4 @@ nlohmann::ordered_json inputJson(const CloudFileInfo& file);
 /// std::runtime_error when it is nothing of the kind.
 CloudFileInfo inputFromJson(const nlohmann::json& json);
 
-nlohmann::ordered_json cameraJson(const Camera& camera);
-
 } // namespace holdfast::io
