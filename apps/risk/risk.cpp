@@ -62,9 +62,10 @@ layersOf(const RiskSettings& settings, const RiskReport& report)
   }
   catch (const std::invalid_argument&) { // foot and load were good for the ranking
     throw std::runtime_error(fmt::format(
-        "{}: a --resolution of {} m makes more than 10 million cells of what was seen",
+        "{}: a --resolution of {} m makes more than {} million cells of what was seen",
         settings.layers,
-        settings.resolution_m));
+        settings.resolution_m,
+        kMaxRiskGridCells / 1'000'000));
   }
 }
 

@@ -13,13 +13,13 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <string>
 
 namespace holdfast {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr std::size_t kLayers = kRiskLayerNames.size();
-constexpr double kMaxCells = 1e7;
 
 /// A patch as the load meets it: over the grid's plane, about its anchor.
 struct SeenFromAbove {
@@ -130,10 +130,11 @@ emptyGrid(const GridBounds& bounds, const Eigen::Matrix3d& axes, double resoluti
   const Eigen::Array2d low = (bounds.low / resolution).array().floor();
   const Eigen::Array2d size =
       ((bounds.high / resolution).array().ceil() - low).max(Eigen::Array2d::Zero());
-  if (!(size.x() * size.y() <= kMaxCells))
+  if (!(size.x() * size.y() <= kMaxRiskGridCells))
     throw std::invalid_argument(
         "holdfast::riskGrid: a grid of that resolution and these bounds would have "
-        "more than 10 million cells");
+        "more than " +
+        std::to_string(kMaxRiskGridCells / 1'000'000) + " million cells");
   RiskGrid grid;
   grid.rows = static_cast<int>(size.x());
   grid.columns = static_cast<int>(size.y());

@@ -29,13 +29,6 @@ extractionFor(const MappingOptions& options, const Sensor& sensor)
   return extraction;
 }
 
-bool
-hasSizeOf(const RangeCloud& frame, const Camera& camera)
-{
-  return static_cast<int>(frame.points->width) == camera.width &&
-         static_cast<int>(frame.points->height) == camera.height;
-}
-
 int
 pixelIndex(const RangeCloud& frame, const Eigen::Vector2d& pixel)
 {
@@ -201,7 +194,7 @@ struct FrameMapper::Places {
 void
 FrameMapper::matchSensor(const RangeCloud& frame)
 {
-  if (!matched_ || !hasSizeOf(frame, matched_->camera))
+  if (!matched_ || !frame.hasSizeOf(matched_->camera))
     matched_ = matchedSensor(sensor_, frame);
 }
 
@@ -211,7 +204,7 @@ FrameMapper::placesIn(const RangeCloud& frame, const Pose& sensor, FrameReport& 
   Places places;
   report.hidden = report.asked = 0;
   // A frame that does not tell its camera has next to no point.
-  if (!hasSizeOf(frame, matched_->camera))
+  if (!frame.hasSizeOf(matched_->camera))
     return places;
   std::vector<WantedSeed> wanted = map_.wantedSeeds(matched_->camera, sensor);
   // Those first that have waited longest, should the time not suffice for all.

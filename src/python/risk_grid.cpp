@@ -242,7 +242,9 @@ gridHelp()
           "    TypeError: an argument is of another kind, or there is no such option.\n"
           "    ValueError: a number makes no sense, a direction is zero, the grid "
           "would "
-          "have\n        more than 10 million cells.\n"
+          "have\n        more than " +
+          std::to_string(kMaxRiskGridCells / 1'000'000) +
+          " million cells.\n"
           "\n"
           "The interpreter's lock is released while it computes.");
 }

@@ -57,15 +57,6 @@ isSame(const Camera& a, const Camera& b)
          a.cx == b.cx && a.cy == b.cy;
 }
 
-/// Or has no pixels.
-bool
-hasSizeOf(const RangeCloud& cloud, const Camera& camera)
-{
-  return cloud.points->height < 2 ||
-         (static_cast<int>(cloud.points->width) == camera.width &&
-          static_cast<int>(cloud.points->height) == camera.height);
-}
-
 } // namespace
 
 Session::Session(const Settings& settings, const Tuning& tuning, TransformLookup lookup)
@@ -158,7 +149,8 @@ Session::watchCamera(const RangeCloud& cloud, const std::optional<Camera>& camer
       matched_ = withCamera(sensor_, *camera);
     return;
   }
-  if (matched_ && hasSizeOf(cloud, matched_->camera))
+  const bool has_pixels = cloud.points->height > 1;
+  if (matched_ && (!has_pixels || cloud.hasSizeOf(matched_->camera)))
     return;
   startAnew();
   matched_ = matchedSensor(sensor_, cloud);

@@ -3,8 +3,9 @@
 #include <holdfast/HoldfastConfig.h>
 #include <holdfast/enum_names.h>
 #include <holdfast/fit/names.h>
+#include <holdfast/io/names.h>
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -16,7 +17,6 @@
 namespace holdfast::robot {
 namespace {
 
-constexpr EnumNames<CloudAxes, 3> kAxesNames{{"camera", "opengl", "ros"}};
 constexpr EnumNames<Input, 2> kInputNames{{"cloud", "depth"}};
 
 /// Of cfg/Holdfast.cfg, which dynamic_reconfigure reads.
@@ -49,7 +49,10 @@ public:
     read(name, word);
     const auto found = names.find(word);
     if (!found)
-      throw std::runtime_error(fmt::format("parameter {}: no '{}'", name, word));
+      throw std::runtime_error(fmt::format("parameter {}: '{}' is none of: {}",
+                                           name,
+                                           word,
+                                           fmt::join(names.words, " ")));
     value = *found;
   }
 
@@ -99,7 +102,7 @@ readSettings(Reader& reader, Settings& settings)
   reader.read("sensor", settings.sensor);
   reader.read("pattern", settings.pattern);
   reader.read("sensor_frame", settings.sensor_frame);
-  reader.readName("axes", kAxesNames, settings.axes);
+  reader.readName("axes", kCloudAxesNames, settings.axes);
   reader.readName("surface", kSurfaceRequestNames, settings.surface);
   reader.read("threads", settings.threads);
   reader.read("map", settings.map);

@@ -116,11 +116,14 @@ struct RiskGrid {
   Eigen::Vector3d point(int row, int column) const;
 };
 
+/// More of them would be a wrong resolution: at 1 cm they are a square of 32 m.
+constexpr int kMaxRiskGridCells = 10'000'000;
+
 /// The risk of putting the foot in the middle of every cell. Where patches lie above
 /// each other, that which the load meets first counts; where they overlap, that whose
 /// anchor is nearest. The result does not depend on the number of threads.
 /// \throw std::invalid_argument when foot or options make no sense, or the grid would
-/// have more than 10 million cells.
+/// have more than kMaxRiskGridCells.
 RiskGrid riskGrid(const PatchMap& map,
                   const Foot& foot,
                   const RiskGridOptions& options = {});

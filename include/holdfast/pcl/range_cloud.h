@@ -2,6 +2,7 @@
 #pragma once
 
 #include <holdfast/geometry/pose.h>
+#include <holdfast/sensor/camera.h>
 
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
@@ -34,6 +35,13 @@ struct RangeCloud {
   bool hasCovariances() const
   {
     return covariances && !covariances->empty();
+  }
+
+  /// The points have as many rows and columns as the camera.
+  bool hasSizeOf(const Camera& camera) const
+  {
+    return static_cast<int>(points->width) == camera.width &&
+           static_cast<int>(points->height) == camera.height;
   }
 };
 
