@@ -280,7 +280,11 @@ TEST_F(CloudDialects, StrangersAreNamed)
       {"<html><body>", "a web page, not the file itself"},
       {std::string("\x1f\x8b\x08\0", 4), "packed by gzip"},
       {std::string("PK\x03\x04") + "abc", "packed by zip"},
-      {"LASF\1\2", "a LAS or LAZ file"}};
+      {"LASF\1\2", "a LAS or LAZ file"},
+      {std::string("II*\0\b", 5), "a TIFF image"},
+      {std::string("\x93NUMPY\1\0", 8), "a NumPy array"},
+      {"P6 2 1 255\nabcdef", "a colour image"},
+      {"{\"message\": \"Not Found\"}", ", but JSON"}};
   for (const auto& [bytes, name] : strangers)
     for (const std::string file : {"a.pcd", "a.ply", "a.png", "a"}) {
       try {
@@ -292,6 +296,33 @@ TEST_F(CloudDialects, StrangersAreNamed)
             << error.what();
       }
     }
+}
+
+TEST_F(CloudDialects, OtherTextIsNamed)
+{
+  const std::map<std::string, std::string> texts{
+      {"0.1 0.2 1.0\n0.2 0.2 1.0\n", ", but a table of numbers"},
+      {"\n0.1,\t-2e-1,1.0,255\r\n", ", but a table of numbers"},
+      {"v 0.1 0.2 1.0\n", ", but OBJ"},
+      {"solid x\nfacet normal 0 0 1\n", ", but STL"},
+      {"1 2\n", "is neither PCD, PLY, 16-bit PNG nor PGM"},
+      {"x,y,z\n1,2,3\n", "is neither PCD, PLY, 16-bit PNG nor PGM"}};
+  for (const auto& [bytes, name] : texts)
+    EXPECT_NE(complaint(bytes).find(name), std::string::npos) << complaint(bytes);
+}
+
+TEST_F(CloudDialects, BytesInAnotherOrderAreDoubted)
+{
+  std::string bytes;
+  for (const Eigen::Vector3f& q : kPoints)
+    for (const float x : q) {
+      const std::string number = rawBytes(x);
+      bytes.append(number.rbegin(), number.rend());
+    }
+  const std::string pcd = replaced(asciiPcd({"FIELDS x y z\n" + kSizes}, bytes),
+                                   "DATA ascii",
+                                   "DATA binary");
+  EXPECT_NE(load(pcd).notices().find("bytes in another order"), std::string::npos);
 }
 
 TEST_F(CloudDialects, NamesInCapitals)

@@ -73,6 +73,8 @@ detectFormat(std::string_view bytes, const std::string& path)
   const std::string_view text = io::skipToText(bytes);
   if (isPly(text))
     return Format::Ply;
+  if (startsWith(text, "{") || startsWith(text, "["))
+    return Format::Unknown;
   for (const std::string_view start :
        {"# .PCD", "VERSION ", "VERSION\t", "FIELDS ", "COLUMNS "})
     if (startsWith(text, start))
@@ -94,11 +96,57 @@ nameOfOtherData(std::string_view bytes)
       {"ASTM-E57"sv, "an E57 file: convert it to PCD or PLY"},
       {"#ROSBAG"sv, "a ROS bag: save a cloud of it as PCD"},
       {"PCLZF"sv, "a PCLZF image: convert it to PNG"},
+      {"II*\0"sv, "a TIFF image: convert it to PNG of 16 bits"},
+      {"MM\0*"sv, "a TIFF image: convert it to PNG of 16 bits"},
+      {"\x76\x2f\x31\x01"sv, "an OpenEXR image: convert it to PNG of 16 bits"},
+      {"Pf\n"sv, "a PFM image: convert it to PNG of 16 bits"},
+      {"P6"sv, "a colour image, not a cloud"},
+      {"\x93NUMPY"sv, "a NumPy array: the Python module's extract() takes such"},
+      {"\x89HDF\r\n"sv, "an HDF5 file: convert it to PCD or PLY"},
   };
   for (const Other& other : kOthers)
     if (startsWith(bytes, other.start))
       return other.name;
   return io::nameOfStranger(bytes);
+}
+
+/// True when the first line is at least three numbers.
+bool
+isTable(std::string_view text)
+{
+  constexpr std::size_t kLongest = 256; // of a line that is looked at
+  text = text.substr(0, kLongest);
+  std::string line(text.substr(0, text.find_first_of("\r\n")));
+  for (char& c : line)
+    if (c == ',' || c == ';' || c == '\t')
+      c = ' ';
+  int numbers = 0;
+  for (std::size_t at = 0, end; at < line.size(); at = end + 1) {
+    end = std::min(line.find(' ', at), line.size());
+    if (end == at)
+      continue;
+    if (!io::parseNumber(std::string_view(line).substr(at, end - at)))
+      return false;
+    ++numbers;
+  }
+  return numbers >= 3;
+}
+
+/// What text that is no cloud is.
+std::string_view
+nameOfOtherText(std::string_view bytes)
+{
+  const std::string_view text = io::skipToText(bytes);
+  if (startsWith(text, "{") || startsWith(text, "["))
+    return ", but JSON";
+  if (startsWith(text, "solid "))
+    return ", but STL: convert it to PLY";
+  for (const std::string_view start : {"v ", "o ", "g ", "mtllib "})
+    if (startsWith(text, start))
+      return ", but OBJ: convert it to PLY";
+  if (isTable(text))
+    return ", but a table of numbers: it wants the header of a PCD file";
+  return "";
 }
 
 io::RawCloud
@@ -130,7 +178,8 @@ readAny(const std::string& path, const LoadOptions& options)
   case Format::Unknown:
     break;
   }
-  throw std::runtime_error("is neither PCD, PLY, 16-bit PNG nor PGM");
+  throw std::runtime_error("is neither PCD, PLY, 16-bit PNG nor PGM" +
+                           std::string(nameOfOtherText(bytes)));
 }
 
 /// What one look at all points tells.
@@ -195,6 +244,14 @@ surveyPoints(pcl::PointCloud<pcl::PointXYZ>& points)
 void
 noteCoarseCoordinates(float largest, CloudFileInfo& info)
 {
+  constexpr float kNoCoordinate = 1e12F; // m: Neptune is 4e12 m away
+  if (largest > kNoCoordinate) {
+    info.notices.push_back(fmt::format(
+        "coordinates up to {:.0e} m cannot be meant: bytes in another order, "
+        "or a header that is not that of the data?",
+        largest));
+    return;
+  }
   const double step_m = std::ldexp(largest, -23);
   if (step_m >= 1e-4)
     info.notices.push_back(
