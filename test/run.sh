@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs what is missing, builds everything and runs every test; then what else must
-# hold: the quick start works, and the tests of bad data and misuse pass under
-# sanitizers. test/clang.sh does the same by clang, with the core alone.
+# hold: the quick start works, the core does without PCL, clang has nothing to say, and
+# the tests of bad data and misuse pass under sanitizers.
 #
 #   test/run.sh [ctest options]     e.g. test/run.sh -R rotation: these tests alone
 #
@@ -23,7 +23,7 @@ leg() {
 install_packages build python test ros
 leg "all tests"
 # Sixteen sources at a time: most of what they take goes into the headers that they
-# share. That each compiles by itself shows below, and under clang.
+# share. That each compiles by itself, clang shows below.
 build_in "$root/build-test" -DCMAKE_BUILD_TYPE=Release -DHOLDFAST_WERROR=$werror \
   -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=16
 ctest --test-dir "$root/build-test" --output-on-failure --parallel 2 "$@"
@@ -31,6 +31,9 @@ ctest --test-dir "$root/build-test" --output-on-failure --parallel 2 "$@"
 
 leg "the quick start, without OpenNI2 and viewer"
 "$root/samples/quickstart.sh" -o "$root/build-quickstart/results"
+
+leg "the core alone, by clang, and every source read by it"
+"$root/test/clang.sh"
 
 leg "sanitizers, without Highway"
 "$root/test/sanitize.sh"

@@ -15,7 +15,6 @@ source "$root/cmake/setup.sh"
 folder=$root/build-sanitize
 sanitizers="address;undefined"
 programs=OFF
-several=OFF # sources at a time, where it is for more than a few tests
 tests=(fit_degenerate pcl_misuse point_types openni2_grabber cloud_io patch_io
   atomic_file config locale patch_extraction parallel
   depth_images cloud_dialects trajectory_file foot_file patch_map contact_risk risk_grid)
@@ -23,14 +22,12 @@ case ${1:-} in
 --all)
   folder=$root/build-sanitize-all
   programs=ON
-  several=ON
   tests=()
   shift
   ;;
 --thread)
   folder=$root/build-sanitize-thread
   sanitizers=thread
-  several=ON
   tests=(patch_extraction frame_extraction monte_carlo consistency parallel
     openni2_grabber)
   shift
@@ -49,13 +46,14 @@ if ((${#existing[@]})); then
 fi
 
 install_packages build test
-# Without Highway, whose vectors take sanitizers minutes to compile. Little optimisation
-# and line numbers alone: what is looked for is found with them, and it compiles sooner.
+# Without Highway, whose vectors take sanitizers minutes to compile. Little optimisation,
+# line numbers alone and several sources at a time: what is looked for is found with
+# them, and it compiles sooner.
 build_in "$folder" -DCMAKE_BUILD_TYPE=RelWithDebInfo \
   -DCMAKE_CXX_FLAGS_RELWITHDEBINFO="-O1 -g1 -DNDEBUG" \
   -DHOLDFAST_SANITIZE="$sanitizers" -DHOLDFAST_WITH_HIGHWAY=OFF \
   -DHOLDFAST_BUILD_APPS=$programs -DHOLDFAST_BUILD_SAMPLES=$programs \
-  -DCMAKE_UNITY_BUILD=$several -DCMAKE_UNITY_BUILD_BATCH_SIZE=16 \
+  -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=16 \
   -DHOLDFAST_BUILD_BENCHMARKS=OFF "${targets[@]}"
 
 # PCL itself is not instrumented, so containers that it fills and we read (or the other
