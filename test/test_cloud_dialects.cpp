@@ -210,6 +210,32 @@ TEST_F(CloudDialects, LineEndsAndMagic)
   }
 }
 
+TEST_F(CloudDialects, WiderBinaryRowsThanAnnouncedAreRefused)
+{
+  test::Random random;
+  for (const std::size_t wider : {1U, 4U, 12U}) { // another type, padding, doubles
+    std::string bytes;
+    for (int i = 0; i < 1200; ++i) {
+      for (int k = 0; k < 3; ++k)
+        bytes += rawBytes(static_cast<float>(random.uniform(0.5, 1.0)));
+      bytes += std::string(wider, 'x');
+    }
+    const auto with1200 = [](const std::string& text) {
+      return replaced(replaced(text, "WIDTH 4", "WIDTH 1200"),
+                      "POINTS 4",
+                      "POINTS 1200");
+    };
+    const std::string pcd = with1200(
+        replaced(asciiPcd("FIELDS x y z\n" + kSizes, ""), "DATA ascii", "DATA binary"));
+    EXPECT_NE(complaint(pcd + bytes).find("corrupt: "), std::string::npos) << wider;
+    const std::string ply =
+        replaced(replaced(asciiPly({}, ""), "ascii", "binary_little_endian"),
+                 "vertex 4",
+                 "vertex 1200");
+    EXPECT_NE(complaint(ply + bytes).find("corrupt: "), std::string::npos) << wider;
+  }
+}
+
 TEST_F(CloudDialects, ColumnsNobodyUsesNeedNoNumbers)
 {
   std::string rows = "0xff " + replaced(kRows, "\n", " chair\n0xff ");
@@ -284,7 +310,8 @@ TEST_F(CloudDialects, StrangersAreNamed)
       {std::string("II*\0\b", 5), "a TIFF image"},
       {std::string("\x93NUMPY\1\0", 8), "a NumPy array"},
       {"P6 2 1 255\nabcdef", "a colour image"},
-      {"{\"message\": \"Not Found\"}", ", but JSON"}};
+      {"{\"message\": \"Not Found\"}", ", but JSON"},
+      {"1.0 2.0 3.0\n", ", but a table of numbers"}};
   for (const auto& [bytes, name] : strangers)
     for (const std::string file : {"a.pcd", "a.ply", "a.png", "a"}) {
       try {
@@ -492,6 +519,27 @@ TEST_F(CloudDialects, LargeCoordinatesAreShiftedBeforeTheyBecomeFloat)
   }
 }
 
+TEST_F(CloudDialects, PointsAboutTheOriginAreNotShifted)
+{
+  test::Random random;
+  std::string rows;
+  for (int i = 0; i < 200; ++i)
+    rows += std::to_string(random.uniform(-1.0, 1.0)) + " " +
+            std::to_string(random.uniform(-1.0, 1.0)) + " " +
+            std::to_string(random.uniform(0.8, 3.0)) + "\n";
+  rows += "3.12 1.65 99.123457\n"; // a stray point
+  const auto cloudOf = [&](const std::string& text) {
+    std::string pcd = asciiPcd("FIELDS x y z\n" + kSizes, text);
+    return replaced(replaced(pcd, "WIDTH 4", "WIDTH 201"), "POINTS 4", "POINTS 201");
+  };
+  Loaded loaded = load(cloudOf(rows));
+  EXPECT_TRUE(loaded.cloud.offset.isZero(0.0));
+  EXPECT_EQ(loaded.notices(), "");
+  // A room in millimetres likewise: its unit is to be recognised.
+  loaded = load(cloudOf(replaced(replaced(rows, ".", ""), " 0", " ")));
+  EXPECT_TRUE(loaded.cloud.offset.isZero(0.0));
+}
+
 TEST_F(CloudDialects, SinglePrecisionHasLostItsDigitsAlready)
 {
   std::string singles;
@@ -617,6 +665,17 @@ TEST_F(CloudDialects, ZerosForNoReturnAreInvalid)
   const Loaded shifted = load(header(5) + "DATA ascii\n" + far + "0 0 0\n");
   EXPECT_EQ(countValidPoints(shifted.cloud), 4);
   EXPECT_EQ(shifted.info.zero_points, 1);
+}
+
+TEST_F(CloudDialects, ZerosThatMovedWithTheCloudAreInvalid)
+{
+  const std::string header = replaced(asciiPcd("FIELDS x y z\n" + kSizes, ""),
+                                      "POINTS 4",
+                                      "VIEWPOINT 1.3 -2.1 0.7 1 0 0 0\nPOINTS 4");
+  const Loaded loaded =
+      load(header + "1.3 -2.1 0.7\n1.3 -2.1 1.7\n1.3 -2.1 0.7\n1.301 -2.1 0.75\n");
+  EXPECT_EQ(loaded.info.zero_points, 2);
+  EXPECT_EQ(countValidPoints(loaded.cloud), 2);
 }
 
 TEST_F(CloudDialects, TooManyPointsAreRefusedByTheHeader)

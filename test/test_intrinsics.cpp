@@ -112,6 +112,24 @@ TEST(RecoverIntrinsics, NothingWhereThereIsNoPinholeImage)
   }))) << "no point";
 }
 
+TEST(RecoverIntrinsics, NothingWhereWidthAndHeightAreExchanged)
+{
+  // 4:3, 3:2, 16:9: rows that begin alike recur after few of them.
+  for (const auto& [width, height] : std::vector<std::pair<int, int>>{{320, 240},
+                                                                      {160, 120},
+                                                                      {240, 160},
+                                                                      {320, 180}}) {
+    const Camera camera = makeCamera(width, height, 0.9 * width);
+    RangeCloud cloud = makeOrganizedCloud(camera, bumpyDepth);
+    ASSERT_TRUE(recoverIntrinsics(cloud));
+    const auto exchanged =
+        pcl::make_shared<pcl::PointCloud<pcl::PointXYZ>>(*cloud.points);
+    std::swap(exchanged->width, exchanged->height);
+    cloud.points = exchanged;
+    EXPECT_FALSE(recoverIntrinsics(cloud)) << width << " x " << height;
+  }
+}
+
 TEST(CameraTypes, DifferByMoreThanTheirCamerasDo)
 {
   const Camera nominal = makeCamera(640, 480, 575.8);

@@ -63,53 +63,6 @@ isPly(std::string_view text)
          std::string_view(" \t\r\n").find(text[3]) != std::string_view::npos;
 }
 
-Format
-detectFormat(std::string_view bytes, const std::string& path)
-{
-  if (startsWith(bytes, kPngSignature))
-    return Format::Png;
-  if (startsWith(bytes, "P5") || startsWith(bytes, "P2"))
-    return Format::Pgm;
-  const std::string_view text = io::skipToText(bytes);
-  if (isPly(text))
-    return Format::Ply;
-  if (startsWith(text, "{") || startsWith(text, "["))
-    return Format::Unknown;
-  for (const std::string_view start :
-       {"# .PCD", "VERSION ", "VERSION\t", "FIELDS ", "COLUMNS "})
-    if (startsWith(text, start))
-      return Format::Pcd;
-  return formatOfExtension(path);
-}
-
-/// What else is often found where a cloud is expected.
-std::optional<std::string_view>
-nameOfOtherData(std::string_view bytes)
-{
-  using namespace std::string_view_literals;
-  struct Other {
-    std::string_view start, name;
-  };
-  static constexpr Other kOthers[]{
-      {"\xff\xd8\xff"sv, "a JPEG image, not a cloud"},
-      {"LASF"sv, "a LAS or LAZ file: convert it to PCD or PLY"},
-      {"ASTM-E57"sv, "an E57 file: convert it to PCD or PLY"},
-      {"#ROSBAG"sv, "a ROS bag: save a cloud of it as PCD"},
-      {"PCLZF"sv, "a PCLZF image: convert it to PNG"},
-      {"II*\0"sv, "a TIFF image: convert it to PNG of 16 bits"},
-      {"MM\0*"sv, "a TIFF image: convert it to PNG of 16 bits"},
-      {"\x76\x2f\x31\x01"sv, "an OpenEXR image: convert it to PNG of 16 bits"},
-      {"Pf\n"sv, "a PFM image: convert it to PNG of 16 bits"},
-      {"P6"sv, "a colour image, not a cloud"},
-      {"\x93NUMPY"sv, "a NumPy array: the Python module's extract() takes such"},
-      {"\x89HDF\r\n"sv, "an HDF5 file: convert it to PCD or PLY"},
-  };
-  for (const Other& other : kOthers)
-    if (startsWith(bytes, other.start))
-      return other.name;
-  return io::nameOfStranger(bytes);
-}
-
 /// True when the first line is at least three numbers.
 bool
 isTable(std::string_view text)
@@ -147,6 +100,51 @@ nameOfOtherText(std::string_view bytes)
   if (isTable(text))
     return ", but a table of numbers: it wants the header of a PCD file";
   return "";
+}
+
+Format
+detectFormat(std::string_view bytes, const std::string& path)
+{
+  if (startsWith(bytes, kPngSignature))
+    return Format::Png;
+  if (startsWith(bytes, "P5") || startsWith(bytes, "P2"))
+    return Format::Pgm;
+  const std::string_view text = io::skipToText(bytes);
+  if (isPly(text))
+    return Format::Ply;
+  for (const std::string_view start :
+       {"# .PCD", "VERSION ", "VERSION\t", "FIELDS ", "COLUMNS "})
+    if (startsWith(text, start))
+      return Format::Pcd;
+  return nameOfOtherText(bytes).empty() ? formatOfExtension(path) : Format::Unknown;
+}
+
+/// What else is often found where a cloud is expected.
+std::optional<std::string_view>
+nameOfOtherData(std::string_view bytes)
+{
+  using namespace std::string_view_literals;
+  struct Other {
+    std::string_view start, name;
+  };
+  static constexpr Other kOthers[]{
+      {"\xff\xd8\xff"sv, "a JPEG image, not a cloud"},
+      {"LASF"sv, "a LAS or LAZ file: convert it to PCD or PLY"},
+      {"ASTM-E57"sv, "an E57 file: convert it to PCD or PLY"},
+      {"#ROSBAG"sv, "a ROS bag: save a cloud of it as PCD"},
+      {"PCLZF"sv, "a PCLZF image: convert it to PNG"},
+      {"II*\0"sv, "a TIFF image: convert it to PNG of 16 bits"},
+      {"MM\0*"sv, "a TIFF image: convert it to PNG of 16 bits"},
+      {"\x76\x2f\x31\x01"sv, "an OpenEXR image: convert it to PNG of 16 bits"},
+      {"Pf\n"sv, "a PFM image: convert it to PNG of 16 bits"},
+      {"P6"sv, "a colour image, not a cloud"},
+      {"\x93NUMPY"sv, "a NumPy array: the Python module's extract() takes such"},
+      {"\x89HDF\r\n"sv, "an HDF5 file: convert it to PCD or PLY"},
+  };
+  for (const Other& other : kOthers)
+    if (startsWith(bytes, other.start))
+      return other.name;
+  return io::nameOfStranger(bytes);
 }
 
 io::RawCloud
@@ -377,9 +375,11 @@ requirePoints(std::size_t valid)
 }
 
 RangeCloud
-finish(io::RawCloud& raw, const LoadOptions& options)
+finish(io::RawCloud& raw, LoadOptions options)
 {
   auto& points = *raw.points;
+  if (raw.info.is_depth_image)
+    options.axes.reset(); // it has those of its camera
   CloudFileInfo& info = raw.info;
   info.axes = options.axes.value_or(CloudAxes::Camera);
   const PointSurvey survey = surveyPoints(points);
@@ -400,6 +400,8 @@ finish(io::RawCloud& raw, const LoadOptions& options)
                             !isIdentity(cloud.sensor_pose);
   invalid_zeros +=
       invalidatedZeros(survey.zeros - invalid_zeros, cloud.sensor_pose, points);
+  invalid_zeros +=
+      static_cast<std::size_t>(invalidateMovedZeros(points, cloud.sensor_pose));
   requirePoints(survey.finite - invalid_zeros);
   cloud.covariances = std::make_shared<const Covariances>(std::move(raw.covariances));
   points.is_dense = survey.finite - invalid_zeros == points.size();
@@ -562,8 +564,9 @@ saveCloud(const std::string& path, const RangeCloud& cloud, bool ascii)
 bool
 isCloudFile(const std::string& path)
 {
-  // NAME.patches.ply, NAME.patches.pcd
-  if (std::filesystem::path(path).stem().extension() == ".patches")
+  // NAME.patches.ply, NAME.patches.pcd, NAME.dense.pcd: results
+  const std::filesystem::path kind = std::filesystem::path(path).stem().extension();
+  if (kind == ".patches" || kind == ".dense")
     return false;
   const Format format = formatOfExtension(path);
   if (format != Format::Png && format != Format::Pgm)

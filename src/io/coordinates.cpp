@@ -37,26 +37,43 @@ losesDigits(const std::vector<double>& xyz)
   return step > kCoarsestStep && error > step / 64.0;
 }
 
+/// Of values that are put into another order.
+double
+quantile(std::vector<double>& values, double share)
+{
+  const auto rank =
+      static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + rank, values.end());
+  return values[static_cast<std::size_t>(rank)];
+}
+
 } // namespace
 
 Eigen::Vector3d
 offsetOf(const std::vector<double>& xyz)
 {
-  Eigen::Vector3d offset = Eigen::Vector3d::Zero();
+  const Eigen::Vector3d none = Eigen::Vector3d::Zero();
   if (!losesDigits(xyz))
-    return offset;
+    return none;
+  // Medians: single points far away do not move them.
+  Eigen::Vector3d middle = none;
+  double spread =
+      0.0; // of the coordinate that varies most, three quarters of its points
   std::vector<double> values;
   for (int axis = 0; axis < 3; ++axis) {
     values.clear();
     for (std::size_t i = 0; i < xyz.size(); i += 3)
       if (isUsable(&xyz[i]))
         values.push_back(xyz[i + static_cast<std::size_t>(axis)]);
-    // The median: single points far away do not move it.
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    offset[axis] = std::round(*middle);
+    middle[axis] = quantile(values, 0.5);
+    for (double& value : values)
+      value = std::abs(value - middle[axis]);
+    spread = std::max(spread, quantile(values, 0.75));
   }
-  return offset;
+  // Points about the origin gain nothing, and it may be where the sensor stood.
+  constexpr double kGain = 8.0; // three bits
+  const bool is_far = middle.lpNorm<Eigen::Infinity>() > kGain * spread;
+  return is_far ? Eigen::Vector3d(middle.array().round()) : none;
 }
 
 void

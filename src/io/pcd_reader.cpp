@@ -8,7 +8,8 @@
 /// - a field x, y, z or covariance twice, or x, y or z with a COUNT other than 1;
 /// - x, y, z or covariance with a word that is not a number;
 /// - binary data of 1000 points or more whose size fits the number of points, but with
-///   more bytes per point than the header announces: some field is missing there;
+///   more bytes per point than the header announces: some field is missing or wider
+///   there, or padded, as points are in memory;
 /// - a compressed block of another size than the header announces;
 /// - more points than LoadOptions::max_points.
 #include "cloud_readers.h"
@@ -630,7 +631,7 @@ judgeSurplus(std::string_view surplus, const Header& header, RawCloud& cloud)
 {
   // In a small cloud that may be chance.
   if (header.points >= 1000 && surplus.size() % header.points == 0 &&
-      surplus.size() % header.point_bytes != 0 && !isPadding(surplus))
+      !isPadding(surplus))
     throw std::runtime_error(
         fmt::format("corrupt: {} bytes of data per point where the header announces {}",
                     header.point_bytes + surplus.size() / header.points,

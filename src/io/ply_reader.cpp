@@ -4,7 +4,8 @@
 ///
 /// What pcl::PLYReader reads and this one refuses, since it would be read wrongly:
 /// - a vertex property x, y or z with a word that is not a number;
-/// - text whose rows have more values than the header announces properties;
+/// - text whose rows have more values than the header announces properties, and binary
+///   data of 1000 rows or more that have more bytes than it announces;
 /// - more vertices than LoadOptions::max_points.
 #include "cloud_readers.h"
 
@@ -522,13 +523,20 @@ makeGrid(Reading& reading)
 
 /// More data than announced are left alone, unless they show that rows were misread.
 void
-judgeSurplus(const NumberSource& source, RawCloud& cloud)
+judgeSurplus(const NumberSource& source, const Header& header, RawCloud& cloud)
 {
   if (source.isAtEnd())
     return;
   if (source.endsWithinLine())
     throw std::runtime_error(
         "corrupt: rows have more values than the header announces properties");
+  // In a small cloud that may be chance.
+  const std::uint64_t rows = header.elements.back().count;
+  if (!header.isAscii() && rows >= 1000 && source.remaining() % rows == 0)
+    throw std::runtime_error(
+        fmt::format("corrupt: {} bytes of data more per {} than the header announces",
+                    source.remaining() / rows,
+                    printable(header.elements.back().name)));
   cloud.info.notices.push_back(
       fmt::format("{} bytes behind the data announced: not used", source.remaining()));
 }
@@ -554,7 +562,7 @@ readPly(std::string_view bytes, const LoadOptions& options)
   RawCloud& cloud = reading.cloud;
   if (cloud.points->empty())
     throw std::runtime_error("holds no vertices");
-  judgeSurplus(source, cloud);
+  judgeSurplus(source, header, cloud);
   makeGrid(reading);
   cloud.info.format = "PLY " + header.format;
   return std::move(cloud);

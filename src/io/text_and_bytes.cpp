@@ -44,8 +44,8 @@ beyondDouble(std::string_view word)
   return negative ? -size : size;
 }
 
-/// The other spellings: of Microsoft's library (1.#QNAN, -1.#IND, 1.#INF) and
-/// "nan(ind)".
+/// The other spellings: of Microsoft's library (1.#QNAN, -1.#IND, 1.#INF, or rounded to
+/// fewer digits, as 1.#R and -1.#IO) and "nan(ind)".
 std::optional<double>
 parseNotFinite(std::string_view word)
 {
@@ -60,8 +60,9 @@ parseNotFinite(std::string_view word)
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   if (starts("1.#inf"))
     return negative ? -kInfinity : kInfinity;
-  if (starts("1.#qnan") || starts("1.#snan") || starts("1.#ind") || starts("1.#nan") ||
-      (starts("nan(") && text.back() == ')'))
+  const bool microsofts =
+      starts("1.#") && text.size() > 3 && text[3] >= 'a' && text[3] <= 'z';
+  if (microsofts || (starts("nan(") && text.back() == ')'))
     return std::numeric_limits<double>::quiet_NaN();
   return std::nullopt;
 }

@@ -24,4 +24,24 @@ invalidateZeroPoints(pcl::PointCloud<pcl::PointXYZ>& points, const Pose& sensor_
   return n;
 }
 
+int
+invalidateMovedZeros(pcl::PointCloud<pcl::PointXYZ>& points, const Pose& sensor_pose)
+{
+  if (sensor_pose.c.isZero(0.0))
+    return 0; // they were not moved
+  const Eigen::Vector3f c = sensor_pose.c.cast<float>();
+  constexpr float kNearest = 1e-3F; // m: nothing is seen there
+  const float rounding = std::min(4.0F * std::numeric_limits<float>::epsilon() *
+                                      c.lpNorm<Eigen::Infinity>(),
+                                  kNearest);
+  int n = 0;
+  for (pcl::PointXYZ& p : points)
+    if ((p.getVector3fMap() - c).lpNorm<Eigen::Infinity>() <= rounding) {
+      p.getVector3fMap().setConstant(std::numeric_limits<float>::quiet_NaN());
+      ++n;
+    }
+  points.is_dense = points.is_dense && n == 0;
+  return n;
+}
+
 } // namespace holdfast

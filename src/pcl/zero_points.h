@@ -14,4 +14,9 @@ namespace holdfast {
 int invalidateZeroPoints(pcl::PointCloud<pcl::PointXYZ>& points,
                          const Pose& sensor_pose);
 
+/// Likewise points at the sensor, to the rounding of floats, which were 0 0 0 before
+/// the cloud was moved: no sensor sees itself. \return how many there were.
+int invalidateMovedZeros(pcl::PointCloud<pcl::PointXYZ>& points,
+                         const Pose& sensor_pose);
+
 } // namespace holdfast
