@@ -4,7 +4,9 @@
 #include "support/organized_cloud.h"
 #include "support/random.h"
 
+#include <holdfast/io/cloud_io.h>
 #include <holdfast/pcl/patch_extraction.h>
+#include <holdfast/sensor/linear_noise_model.h>
 
 #include <cmath>
 #include <numeric>
@@ -107,6 +109,19 @@ TEST_P(Foreign, AxesAreRecognised)
   EXPECT_FALSE(isNoted(extract(room), "--axes"));
 }
 
+TEST(Foreign, AxesThatWereRightAreNotTurnedAgain)
+{
+  Random random;
+  RangeCloud room = makeRoom(random);
+  for (const CloudAxes axes : {CloudAxes::OpenGl, CloudAxes::Ros}) {
+    room.sensor_pose.R = turnFromCamera(axes);
+    room.sensor_pose_given = true;
+    const ExtractionResult result = extract(room);
+    EXPECT_TRUE(isNoted(result, "or is wrong where it was given") ||
+                isNoted(result, "as --axes ros turns them"));
+  }
+}
+
 TEST_P(Foreign, UnitsAreRecognised)
 {
   Random random;
@@ -122,6 +137,8 @@ TEST_P(Foreign, UnitsAreRecognised)
         });
     const ExtractionResult result = extract(scaled);
     EXPECT_TRUE(isNoted(result, option)) << option;
+    for (const auto& [ignored, other] : units)
+      EXPECT_EQ(isNoted(result, other), other == option) << other;
   }
 }
 
@@ -193,6 +210,27 @@ TEST(Points, ThatAreThereTwiceCountOnce)
   }
 }
 
+TEST(Points, OfEnlargedImagesCountOnce)
+{
+  Random random;
+  const RangeCloud room = makeRoom(random);
+  for (const auto& [columns, rows] :
+       std::vector<std::pair<std::uint32_t, std::uint32_t>>{{2, 1}, {1, 2}, {2, 2}}) {
+    const auto points = pcl::make_shared<Points>(columns * room.points->width,
+                                                 rows * room.points->height);
+    for (std::uint32_t v = 0; v < points->height; ++v)
+      for (std::uint32_t u = 0; u < points->width; ++u)
+        (*points)(u, v) = (*room.points)(u / columns, v / rows);
+    RangeCloud enlarged = room;
+    enlarged.points = points;
+    const ExtractionResult result = extract(enlarged);
+    EXPECT_EQ(result.points.used, static_cast<int>(room.points->size()));
+    EXPECT_TRUE(isNoted(result, "lie exactly where others do"));
+    EXPECT_GT(result.patches.size(), 50U); // though no pixel touches another
+  }
+  EXPECT_EQ(extract(room).points.duplicate, 0);
+}
+
 TEST(Points, PlusAndMinusZeroAreTheSamePlace)
 {
   RangeCloud cloud;
@@ -236,6 +274,24 @@ TEST(Seeds, WhoseNeighborhoodsAreTheWholeCloudAreTriedOnce)
   EXPECT_LE(result.patches.size(), 1U);
 }
 
+TEST(Seeds, OfAnImageWithLonePixelsLikewise)
+{
+  Random random;
+  RangeCloud room = makeRoom(random);
+  const auto points = pcl::make_shared<Points>(*room.points);
+  for (std::uint32_t u = 1; u < 30; u += 2) // each on its own
+    for (std::uint32_t v = 0; v < 2; ++v) {
+      (*points)(u - 1, v).z = test::kNaN;
+      (*points)(u, 1).z = test::kNaN;
+    }
+  room.points = points;
+  ExtractionOptions options = makeOptions();
+  options.sampler.radius_m = 50.0;
+  const ExtractionResult result = extractPatches(room, makeSensor(kCamera), options);
+  EXPECT_TRUE(isNoted(result, "larger than the cloud"));
+  EXPECT_LE(result.patches.size(), 1U);
+}
+
 /// Points all over a sphere around the origin.
 RangeCloud
 makeModel(Random& random)
@@ -250,6 +306,22 @@ makeModel(Random& random)
   RangeCloud cloud;
   cloud.points = points;
   return cloud;
+}
+
+TEST(Viewpoint, OfASpinningScannerIsWithinItsCloud)
+{
+  Random random;
+  const RangeCloud hall =
+      changed(makeModel(random),
+              false,
+              [](const Eigen::Vector3f& q) -> Eigen::Vector3f { return 20.0F * q; });
+  Sensor scanner = makeSensor(kCamera);
+  scanner.noise =
+      std::make_shared<const LinearNoiseModel>(LinearNoiseModel::Parameters{});
+  ASSERT_TRUE(scanner.noise->isOmnidirectional());
+  const ExtractionResult result = extractPatches(hall, scanner, makeOptions());
+  EXPECT_TRUE(result.viewpoint_is_credible);
+  EXPECT_FALSE(isNoted(result, "--viewpoint"));
 }
 
 TEST(Viewpoint, InsideAModelIsDoubtedUnlessGiven)

@@ -19,6 +19,10 @@ constexpr std::size_t kFewestPoints = 3;
 constexpr std::size_t kProbes = 64;
 constexpr std::size_t kWorthProbing = 4 * kProbes;
 
+/// Where the neighbourhoods of most seeds have so much of the cloud, the radius may be
+/// larger than that. (Surfaces, jumps and lone pixels leave something out.)
+constexpr double kMuch = 0.25;
+
 /// The unit in which the cloud would be like those of depth cameras: of the size of a
 /// room, with points some millimetres apart; empty when it is so already.
 std::string
@@ -29,17 +33,25 @@ likelyUnit(const CloudMeasure& measure)
     const char* option;
   };
   constexpr std::array<Unit, 3> kUnits{{{1e-3, "mm"}, {1e-2, "cm"}, {1e-6, "um"}}};
+  constexpr double kSpacing = 3e-3, kExtent = 3.0; // of a room before a camera, m
   const auto plausible = [&measure](double scale) {
     const double spacing = scale * measure.spacing_m;
     const double extent = scale * measure.extent();
     return spacing >= 2e-4 && spacing <= 0.03 && extent >= 0.05 && extent <= 30.0;
   };
+  const auto strangeness = [&measure](double scale) {
+    return std::abs(std::log(scale * measure.spacing_m / kSpacing)) +
+           std::abs(std::log(scale * measure.extent() / kExtent));
+  };
   if (plausible(1.0))
     return {};
+  const Unit* likeliest = nullptr;
   for (const Unit& unit : kUnits)
-    if (plausible(unit.scale))
-      return unit.option;
-  return {};
+    if (plausible(unit.scale) &&
+        (likeliest == nullptr ||
+         strangeness(unit.scale) < strangeness(likeliest->scale)))
+      likeliest = &unit;
+  return likeliest == nullptr ? "" : likeliest->option;
 }
 
 std::string
@@ -110,7 +122,7 @@ fallbackNotice(const NeighborhoodSampler& sampler, const RangeCloud& cloud)
 std::string
 viewpointNotice(const RangeCloud& cloud)
 {
-  const Eigen::Vector3d& c = cloud.sensor_pose.c;
+  const Eigen::Vector3d c = cloud.sensor_pose.c + cloud.offset; // in the file
   return fmt::format(
       "it is not known where the cloud was taken from, and the points do "
       "not look as if it were {} {} {}: normals may be on the wrong side "
@@ -131,14 +143,14 @@ keepPromisingSeeds(const PointSelection& chosen,
   if (seeds.size() < kWorthProbing || sampler.neighborhood == Neighborhood::Knn)
     return;
   const std::vector<Seed> probes = probesAmong(seeds);
-  const auto whole = static_cast<std::size_t>(chosen.points.used);
+  const auto whole = static_cast<double>(chosen.points.used);
   std::size_t with_neighbors = 0;
-  std::size_t with_all = 0;
+  std::size_t with_much = 0;
   std::vector<int> indices;
   for (const Seed& seed : probes) {
     search(seed, 0, indices);
     with_neighbors += indices.size() >= kFewestPoints;
-    with_all += indices.size() == whole;
+    with_much += static_cast<double>(indices.size()) > kMuch * whole;
   }
   if (with_neighbors <= 1) {
     const CloudMeasure measure = measured(chosen);
@@ -150,12 +162,14 @@ keepPromisingSeeds(const PointSelection& chosen,
                     described(measure, radiusAdvice(measure, sampler.radius_m))));
     seeds = probes;
   }
-  else if (with_all == probes.size()) {
-    notices.push_back(
-        fmt::format("each neighbourhood is the whole cloud, so only one seed is tried: "
-                    "the radius of {} is larger than the cloud, {}",
-                    meters(sampler.radius_m),
-                    describe(measured(chosen))));
+  else if (2 * with_much > probes.size()) {
+    const CloudMeasure measure = measured(chosen);
+    if (sampler.radius_m < measure.extent())
+      return;
+    notices.push_back(fmt::format("only one seed is tried, since the radius of {} is "
+                                  "larger than the cloud, {}",
+                                  meters(sampler.radius_m),
+                                  describe(measure)));
     seeds = {probes[probes.size() / 2]};
   }
 }
@@ -168,10 +182,12 @@ adviseOnNoPatches(const PointSelection& chosen,
   if (std::any_of(result.patches.begin(), result.patches.end(), isAccepted))
     return;
   if (chosen.points.used == 0) {
+    const std::string left_out = leftOutText(chosen.points);
     result.notices.push_back(
-        fmt::format("no patch, since no point can be used: {} of {} are invalid",
+        fmt::format("no patch, since no point can be used: {} of {} are invalid{}",
                     chosen.points.invalid,
-                    chosen.points.in_cloud));
+                    chosen.points.in_cloud,
+                    left_out.empty() ? "" : ", " + left_out));
     return;
   }
   const CloudMeasure measure = measured(chosen);

@@ -13,6 +13,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <limits>
 #include <memory>
 #include <stdexcept>
@@ -59,14 +60,51 @@ dropInvalidCovariances(const RangeCloud& cloud, UnusedPoints& unused)
       unused.drop(i, &PointAccounting::invalid_covariance);
 }
 
+/// True when some pixel has the point of the one before it or above it, as in images
+/// that were enlarged.
+bool
+repeatsPixels(const pcl::PointCloud<pcl::PointXYZ>& points)
+{
+  constexpr std::uint32_t kStep = 7; // rows: enough, and of either parity
+  const auto isSame = [](const pcl::PointXYZ& a, const pcl::PointXYZ& b) {
+    return a.x == b.x && a.y == b.y && a.z == b.z; // never when NaN
+  };
+  for (std::uint32_t v = 1; v < points.height; v += kStep)
+    for (std::uint32_t u = 1; u < points.width; ++u)
+      if (isSame(points(u, v), points(u - 1, v)) ||
+          isSame(points(u, v), points(u, v - 1)))
+        return true;
+  return false;
+}
+
 /// The pixels of an image are seen along different rays, so none repeats another.
 bool
 isImage(const RangeCloud& cloud, const Sensor& sensor)
 {
-  if (cloud.points->height < 2)
+  if (cloud.points->height < 2 || repeatsPixels(*cloud.points))
     return false;
   const auto residual = pixelResidual(cloud, sensor.camera);
   return (residual && *residual <= kMaxResidualPx) || recoverIntrinsics(cloud);
+}
+
+/// Without rows and columns: neighbours among them are not neighbours any more.
+RangeCloud
+withoutGrid(RangeCloud cloud)
+{
+  auto points = pcl::make_shared<pcl::PointCloud<pcl::PointXYZ>>(*cloud.points);
+  points->width = static_cast<std::uint32_t>(points->size());
+  points->height = 1;
+  cloud.points = points;
+  return cloud;
+}
+
+/// True for a spinning scanner, whose clouds are around it. Constant noise is that of
+/// no sensor.
+bool
+looksAround(const NoiseModel& noise)
+{
+  return noise.isOmnidirectional() &&
+         dynamic_cast<const ConstantNoiseModel*>(&noise) == nullptr;
 }
 
 void
@@ -103,8 +141,8 @@ selectPoints(const RangeCloud& cloud, const Sensor& nominal)
   PointSelection selection;
   selection.sensor =
       nominal.noise ? nominal : withConstantNoise(nominal, kUnknownSigma);
-  const bool model_asked =
-      !cloud.hasCovariances() && nominal.noise && !nominal.noise->isOmnidirectional();
+  const bool has_model = !cloud.hasCovariances() && nominal.noise;
+  const bool model_asked = has_model && !nominal.noise->isOmnidirectional();
   const ViewCheck view(cloud, selection.sensor);
   UnusedPoints unused(cloud);
   if (model_asked && view.isForeign()) {
@@ -121,12 +159,29 @@ selectPoints(const RangeCloud& cloud, const Sensor& nominal)
   if (!isImage(cloud, nominal))
     unused.dropDuplicates();
   selection.viewpoint_is_credible =
-      cloud.sensor_pose_given || !(model_asked ? view.isForeign() : view.isAllAround());
+      cloud.sensor_pose_given || (has_model && looksAround(*nominal.noise)) ||
+      !(model_asked ? view.isForeign() : view.isAllAround());
   selection.cloud = unused.usedCloud();
   selection.points = unused.accounting();
+  if (selection.points.duplicate > 0 && cloud.points->height > 1)
+    selection.cloud = withoutGrid(selection.cloud);
   noteDuplicates(selection);
   noteLeftOut(selection);
   return selection;
+}
+
+PointAccounting&
+PointAccounting::operator+=(const PointAccounting& other)
+{
+  for (int PointAccounting::*count : {&PointAccounting::in_cloud,
+                                      &PointAccounting::invalid,
+                                      &PointAccounting::behind_camera,
+                                      &PointAccounting::out_of_view,
+                                      &PointAccounting::invalid_covariance,
+                                      &PointAccounting::duplicate,
+                                      &PointAccounting::used})
+    this->*count += other.*count;
+  return *this;
 }
 
 std::string

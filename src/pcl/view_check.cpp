@@ -73,17 +73,22 @@ struct NamedUnit {
   const char* what;
 };
 
-const std::array<NamedAxes, 3>&
+const std::array<NamedAxes, 4>&
 knownAxes()
 {
   using V = Eigen::Vector3d;
-  static const std::array<NamedAxes, 3> axes{
+  const Eigen::Matrix3d of_opengl = rows(V::UnitX(), -V::UnitY(), -V::UnitZ());
+  const Eigen::Matrix3d of_ros = rows(-V::UnitY(), -V::UnitZ(), V::UnitX());
+  static const std::array<NamedAxes, 4> axes{
       {{Eigen::Matrix3d::Identity(), ""},
-       {rows(V::UnitX(), -V::UnitY(), -V::UnitZ()),
-        "the points lie behind the sensor (y up, z back?): --axes opengl turns them"},
-       {rows(-V::UnitY(), -V::UnitZ(), V::UnitX()),
+       {of_opengl,
+        "the points lie behind the sensor (y up, z back?): --axes opengl turns them, "
+        "or is wrong where it was given"},
+       {of_ros,
         "the points lie beside and behind the sensor (x forward, z up?): --axes ros "
-        "turns them"}}};
+        "turns them"},
+       {of_ros.transpose(),
+        "the points lie beside and behind the sensor as --axes ros turns them"}}};
   return axes;
 }
 
