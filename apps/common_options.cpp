@@ -1,6 +1,11 @@
 #include "common_options.h"
 
+#include <holdfast/io/cloud_io.h>
+
 #include <CLI/CLI.hpp>
+
+#include <filesystem>
+#include <stdexcept>
 
 namespace holdfast::app {
 
@@ -37,8 +42,23 @@ addJsonOption(CLI::App& command,
                   "Write JSON to this file, or with - to standard output and nothing "
                   "else there" +
                       (layout.empty() ? "" : "; " + layout))
+      // As in 'info --json *.pcd', where it takes the first cloud for its FILE.
+      ->check([](const std::string& file) {
+        return isCloudFile(file) ?
+                   file + " is named as a cloud: JSON would replace it" :
+                   std::string();
+      })
       ->type_name("FILE")
       ->group("Output");
+}
+
+void
+requireNoInput(const std::string& output, const std::vector<std::string>& inputs)
+{
+  std::error_code none_there;
+  for (const std::string& input : inputs)
+    if (std::filesystem::equivalent(output, input, none_there))
+      throw std::runtime_error(output + ": would replace what it is made from");
 }
 
 } // namespace holdfast::app

@@ -4,6 +4,7 @@
 #include <CLI/App.hpp>
 
 #include <string>
+#include <vector>
 
 namespace holdfast::app {
 
@@ -20,5 +21,8 @@ CLI::Option* addJsonOption(CLI::App& command,
                            std::string& path,
                            const std::string& layout = "",
                            const std::string& former_name = "");
+
+/// \throw std::runtime_error when a file to be written is one of those that are read.
+void requireNoInput(const std::string& output, const std::vector<std::string>& inputs);
 
 } // namespace holdfast::app

@@ -5,6 +5,7 @@
 #include "input_options.h"
 
 #include "io/json_parts.h"
+#include "pcl/view_check.h"
 
 #include <holdfast/io/atomic_file.h>
 #include <holdfast/io/config.h>
@@ -146,6 +147,8 @@ factsAbout(const std::string& path,
   facts.camera = recoverIntrinsics(cloud, &facts.camera_rms_px);
   if (facts.camera)
     facts.sensors = known.like(*facts.camera, facts.file.notices);
+  if (const std::string hint = ViewCheck(cloud, taken_by).hint(); !hint.empty())
+    facts.file.notices.push_back(hint);
   facts.has_covariances = cloud.hasCovariances();
   facts.invalid_covariances = countInvalidCovariances(cloud);
   return facts;
@@ -307,8 +310,10 @@ runInfo(const InfoSettings& settings)
 {
   const Sensor sensor = loadSensorOption(settings.input.sensor_name);
   std::optional<AtomicFile> file;
-  if (!settings.json_path.empty() && settings.json_path != "-")
+  if (!settings.json_path.empty() && settings.json_path != "-") {
+    requireNoInput(settings.json_path, settings.input.clouds);
     file.emplace(settings.json_path);
+  }
   bool has_json = false;
   KnownSensors known;
   const int exit_code =

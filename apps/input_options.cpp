@@ -318,7 +318,20 @@ inputNotices(const InputOptions& options, const CloudFileInfo& info)
     notices.emplace_back("no depth image: --depth-scale does not apply");
   if (options.unit && info.is_depth_image)
     notices.emplace_back("a depth image: --depth-scale applies, not --unit");
+  if (options.axes && info.is_depth_image)
+    notices.emplace_back("a depth image has the axes of its camera: --axes does not "
+                         "apply");
   return notices;
+}
+
+std::optional<std::string>
+assumedViewpoint(const RangeCloud& cloud, bool is_credible)
+{
+  const bool is_image = cloud.points->height > 1;
+  if (cloud.sensor_pose_given || is_image || !is_credible)
+    return std::nullopt;
+  return "the file does not say where the cloud was taken from: 0 0 0 is assumed, and "
+         "normals show there; --viewpoint X Y Z says otherwise";
 }
 
 } // namespace holdfast::app

@@ -75,4 +75,8 @@ RangeCloud withoutPatternMap(const std::string& path,
 std::vector<std::string> inputNotices(const InputOptions& options,
                                       const CloudFileInfo& info);
 
+/// Of a cloud whose normals show to an origin that the file does not name, and that no
+/// rows and columns confirm; none otherwise, or where it is doubted already.
+std::optional<std::string> assumedViewpoint(const RangeCloud& cloud, bool is_credible);
+
 } // namespace holdfast::app

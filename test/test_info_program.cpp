@@ -161,6 +161,37 @@ saveWall(const std::string& path, const Camera& camera)
   saveCloud(path, {points, {}, {}});
 }
 
+TEST(InfoProgram, OtherAxesAndUnitsAreNamed)
+{
+  const std::string folder = test::freshFolder("info_axes");
+  const std::string cloud = folder + "/rocks.pcd";
+  ASSERT_EQ(
+      test::runProgram(folder, {"simulate", "rocks", "--stride", "8", "-o", cloud})
+          .exit_code,
+      0);
+  const auto noted = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"info", cloud};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return test::runProgram(folder, arguments).out;
+  };
+  EXPECT_EQ(noted({}).find("note"), std::string::npos);
+  EXPECT_NE(noted({"--axes", "opengl"}).find("is wrong where it was given"),
+            std::string::npos);
+  const RangeCloud world = loadCloud(cloud);
+  const auto points = pcl::make_shared<pcl::PointCloud<pcl::PointXYZ>>(*world.points);
+  for (pcl::PointXYZ& p : *points) { // of a camera, upside down
+    const Eigen::Vector3d q =
+        world.sensor_pose.toLocal(p.getVector3fMap().cast<double>());
+    p.getVector3fMap() =
+        Eigen::Vector3d(1e3 * q.x(), -1e3 * q.y(), -1e3 * q.z()).cast<float>();
+  }
+  RangeCloud turned;
+  turned.points = points;
+  saveCloud(cloud, turned);
+  EXPECT_NE(noted({}).find("--axes opengl"), std::string::npos);
+  EXPECT_NE(noted({}).find("--unit mm"), std::string::npos);
+}
+
 TEST(InfoProgram, NamesTheSensorsWhosePixelsTheseAre)
 {
   const std::string folder = freshFolder("info_sensors");

@@ -240,6 +240,14 @@ TEST(ManifestProgram, WrongUsageAndListsExitWithOne)
   EXPECT_EQ(runProgram(folder, {"fit"}).exit_code, 2);
 }
 
+TEST(ManifestProgram, AByteOrderMarkIsNoPartOfAName)
+{
+  const std::string folder = freshFolder("manifest_bom");
+  const std::string list = makeClouds(folder, 1);
+  test::writeFile(list, "\xef\xbb\xbf" + test::readFile(list));
+  EXPECT_EQ(fitList(folder, {"-o", folder + "/out"}).exit_code, 0);
+}
+
 TEST(ManifestProgram, NamesBehindATabTellCloudsApart)
 {
   const std::string folder = freshFolder("manifest_names");

@@ -197,6 +197,19 @@ TEST_F(ProgramErrors, BadCovariancesAreCountedAndLeftOut)
   EXPECT_FALSE(std::filesystem::exists(folder_ + "/none"));
 }
 
+TEST_F(ProgramErrors, NoCloudIsReplacedByItsResult)
+{
+  const std::string bytes = test::readFile(good_);
+  // As in --json *.pcd.
+  expectError(2, {"--json", good_, good_}, "is named as a cloud");
+  const std::string bare = write("bare", bytes);
+  expectError(1, {bare, "--json", bare}, "would replace what it is made from");
+  EXPECT_EQ(runProgram(folder_, {"info", bare, "--json", bare}).exit_code, 1);
+  EXPECT_EQ(runProgram(folder_, {"info", "--json", good_, good_}).exit_code, 2);
+  EXPECT_EQ(test::readFile(good_), bytes);
+  EXPECT_EQ(test::readFile(bare), bytes);
+}
+
 TEST_F(ProgramErrors, WholeThatFailsNamesTheStatus)
 {
   const std::string line = write("line.pcd",

@@ -98,6 +98,9 @@ TEST_F(RiskProgram, WritesWhatItsPageSays)
   const Json json = rocks();
   EXPECT_EQ(json["source"], kRocks);
   EXPECT_EQ(json["frame"], "cloud");
+  EXPECT_GT(json["cloud_points"]["used"], 0);
+  EXPECT_EQ(json["sensor"]["viewpoint_credible"], true);
+  EXPECT_NE(json["notices"].dump().find("intrinsics recovered"), std::string::npos);
   EXPECT_EQ(json["foot"]["name"], "point_foot");
   expectNumbers(json["load_direction"], 3);
   EXPECT_EQ(json["assumptions"].size(), kRiskAssumptions.size());

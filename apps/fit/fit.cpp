@@ -1,5 +1,6 @@
 #include "batch.h"
 #include "commands.h"
+#include "common_options.h"
 #include "console.h"
 #include "dense_output.h"
 #include "fingerprint.h"
@@ -60,8 +61,10 @@ class Output {
 public:
   explicit Output(const FitSettings& settings) : settings_(settings)
   {
-    if (!settings.json_path.empty() && settings.json_path != "-")
+    if (!settings.json_path.empty() && settings.json_path != "-") {
+      requireNoInput(settings.json_path, settings.input.clouds);
       json_.emplace(settings.json_path);
+    }
     if (!settings.output_folder.empty())
       checkFolder(settings.output_folder);
   }
@@ -253,6 +256,10 @@ fitReport(const std::string& path,
   report.fit_ms = fitting.milliseconds();
   std::vector<std::string>& notices = report.result.notices;
   notices.insert(notices.begin(), input.notices.begin(), input.notices.end());
+  if (const auto notice =
+          assumedViewpoint(input.cloud, report.result.viewpoint_is_credible);
+      notice && report.options.normal_side == NormalSide::Viewpoint)
+    notices.push_back(*notice);
   if (!settings.quiet && settings.manifest.empty())
     printNotices(path, notices);
   clean = checkCovariances(path, report.result.points);

@@ -50,6 +50,9 @@ readManifest(const std::string& path)
   std::size_t number = 0;
   for (std::string line; std::getline(file, line);) {
     ++number;
+    if (constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+        number == 1 && line.compare(0, kByteOrderMark.size(), kByteOrderMark) == 0)
+      line.erase(0, kByteOrderMark.size());
     if (!line.empty() && line.back() == '\r')
       line.pop_back();
     if (line.empty() || line[0] == '#')

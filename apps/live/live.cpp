@@ -132,6 +132,7 @@ private:
   Sensor sensor_;
   FrameExtractor extractor_;
   std::optional<FrameMapper> mapper_;
+  MapSource map_source_;
   int lost_frames_ = 0; ///< whose pose in the map was not found
   std::optional<Recording> recording_;
   std::optional<JsonLines> json_;
@@ -180,6 +181,7 @@ LiveSession::extract(const RangeCloud& cloud)
   if (report.registration &&
       report.registration->status != RegistrationStatus::Converged)
     ++lost_frames_;
+  map_source_.addFrame(report.extraction);
   return std::move(report.extraction);
 }
 
@@ -193,10 +195,10 @@ LiveSession::finish()
   const PatchMap& map = mapper_->map();
   if (map.patches().empty())
     throw std::runtime_error("no patch in any frame: no map is written");
+  map_source_.name = fmt::format("map of {} frames", map.frames());
+  map_source_.options = settings_.extraction.options;
   writeMap(map,
-           sensor_,
-           settings_.extraction.options,
-           fmt::format("map of {} frames", map.frames()),
+           map_source_,
            fitsOf(map, settings_.extraction.options.fit),
            {settings_.map_files, ""});
   if (!settings_.run.quiet && lost_frames_ > 0)

@@ -1,4 +1,5 @@
 #include "commands.h"
+#include "common_options.h"
 #include "console.h"
 #include "map/frame_poses.h"
 #include "map/map_output.h"
@@ -75,7 +76,10 @@ class Mapping {
 public:
   Mapping(const MapSettings& settings, const Sensor& sensor)
   : settings_(settings), sensor_(sensor)
-  {}
+  {
+    source_.sensor = sensor;
+    source_.options = settings.extraction.options;
+  }
 
   void run(const std::vector<std::string>& frames)
   {
@@ -105,21 +109,19 @@ public:
   {
     return single_sigmas_;
   }
-  const Sensor& sensor() const
+
+  /// What was learned of the frames; without a name.
+  const MapSource& source() const
   {
-    return sensor_;
+    return source_;
   }
 
 private:
   void note(const std::string& path, const std::vector<std::string>& notices)
   {
-    if (settings_.quiet)
-      return;
     for (const std::string& notice : notices)
-      if (std::find(said_.begin(), said_.end(), notice) == said_.end()) {
-        said_.push_back(notice); // once, not for every frame
+      if (source_.addNotice(notice) && !settings_.quiet)
         printNotice(path + ": " + notice);
-      }
   }
 
   void start(const std::vector<Pose>& poses)
@@ -151,7 +153,14 @@ private:
     RangeCloud cloud = loadCloud(path, loadOptions(settings_.input, sensor_), &file);
     std::vector<std::string> notices = inputNotices(settings_.input, file);
     cloud = withoutPatternMap(path, cloud, sensorOf(file, sensor_), notices);
+    if (!source_.file) { // the others are of the same camera
+      std::string notice;
+      matchedSensor(sensorOf(file, sensor_), cloud, &notice);
+      if (!notice.empty())
+        notices.push_back(notice);
+    }
     note(path, notices);
+    source_.file = file;
     if (cloud.points->height < 2)
       throw std::runtime_error(path + ": a map wants frames of a camera, and these "
                                       "points lie on no rows and columns");
@@ -169,6 +178,7 @@ private:
                              map().patches().size(),
                              clock.milliseconds());
     note(path, report.extraction.notices);
+    source_.addFrame(report.extraction);
     for (const ExtractedPatch& patch : report.extraction.patches)
       single_sigmas_.push_back(centreSigma(patch.fit, patch.fit.state.normal));
   }
@@ -198,7 +208,7 @@ private:
   std::optional<FrameMapper> mapper_;
   std::optional<Pose> last_pose_;
   std::vector<double> single_sigmas_;
-  std::vector<std::string> said_;
+  MapSource source_;
 };
 
 int
@@ -207,19 +217,21 @@ runMap(const CLI::App& command, MapSettings& settings)
   finishMapOptions(command, settings);
   const Sensor named = loadSensorOption(settings.input.sensor_name);
   const std::vector<std::string> frames = framesOf(settings);
+  requireNoInput(settings.output.ply, frames);
   Mapping mapping(settings, settings.no_pattern ? withoutPattern(named) : named);
   mapping.run(frames);
-  const ExtractionOptions& options = settings.extraction.options;
-  const std::vector<FitResult> fits = fitsOf(mapping.map(), options.fit);
+  const std::vector<FitResult> fits =
+      fitsOf(mapping.map(), settings.extraction.options.fit);
   if (!settings.quiet)
     std::cout << mapTable(mapping.map(), fits, mapping.singleSigmas()) << std::flush;
   if (mapping.map().patches().empty())
     throw std::runtime_error("no patch in any of the frames: no map is written");
-  const std::string name = fmt::format("map of {} frames, {} to {}",
-                                       frames.size(),
-                                       fs::path(frames.front()).filename().string(),
-                                       fs::path(frames.back()).filename().string());
-  writeMap(mapping.map(), mapping.sensor(), options, name, fits, settings.output);
+  MapSource source = mapping.source();
+  source.name = fmt::format("map of {} frames, {} to {}",
+                            frames.size(),
+                            fs::path(frames.front()).filename().string(),
+                            fs::path(frames.back()).filename().string());
+  writeMap(mapping.map(), source, fits, settings.output);
   return 0;
 }
 

@@ -4,6 +4,7 @@
 #include <holdfast/io/patch_io.h>
 #include <holdfast/io/patch_map_file.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <utility>
@@ -20,16 +21,17 @@ isJson(const std::string& path)
 /// The map as the patches of one cloud.
 PatchReport
 reportOf(const PatchMap& map,
-         const Sensor& sensor,
-         const ExtractionOptions& options,
-         const std::string& name,
+         const MapSource& source,
          const std::vector<FitResult>& fits)
 {
   PatchReport report;
-  report.cloud = name;
+  report.cloud = source.name;
+  report.file = source.file;
   report.sensor_pose = map.pose();
-  report.options = options;
-  report.result.sensor = sensor;
+  report.options = source.options;
+  report.result.sensor = source.sensor;
+  report.result.points = source.points;
+  report.result.notices = source.notices;
   report.map = &map;
   for (std::size_t i = 0; i < fits.size(); ++i) {
     ExtractedPatch patch;
@@ -41,6 +43,24 @@ reportOf(const PatchMap& map,
 }
 
 } // namespace
+
+void
+MapSource::addFrame(const ExtractionResult& frame)
+{
+  points += frame.points;
+  sensor = frame.sensor;
+  for (const std::string& notice : frame.notices)
+    addNotice(notice);
+}
+
+bool
+MapSource::addNotice(const std::string& notice)
+{
+  if (std::find(notices.begin(), notices.end(), notice) != notices.end())
+    return false;
+  notices.push_back(notice);
+  return true;
+}
 
 bool
 isMapOutput(const std::string& path)
@@ -59,13 +79,11 @@ fitsOf(const PatchMap& map, const FitOptions& options)
 
 void
 writeMap(const PatchMap& map,
-         const Sensor& sensor,
-         const ExtractionOptions& options,
-         const std::string& name,
+         const MapSource& source,
          const std::vector<FitResult>& fits,
          const MapOutput& output)
 {
-  const PatchReport report = reportOf(map, sensor, options, name, fits);
+  const PatchReport report = reportOf(map, source, fits);
   std::vector<std::unique_ptr<AtomicFile>> files;
   std::vector<AtomicFile*> pointers;
   const auto open = [&](const std::string& path) -> std::ostream& {
@@ -77,7 +95,7 @@ writeMap(const PatchMap& map,
     if (isJson(path))
       writeJson(open(path), report, JsonLayout::PatchPerLine);
     else
-      writePatchMap(open(path), {map, sensor.name});
+      writePatchMap(open(path), {map, source.sensor.name});
   if (!output.ply.empty())
     writeMesh(open(output.ply), report.result.patches, false);
   AtomicFile::commit(pointers);

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <holdfast/fusion/patch_map.h>
+#include <holdfast/io/cloud_io.h>
 #include <holdfast/pcl/patch_extraction.h>
 #include <holdfast/sensor/sensor.h>
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,17 +20,29 @@ struct MapOutput {
   std::string ply; ///< empty: none
 };
 
+/// What is told of the frames of a map, beside its patches.
+struct MapSource {
+  std::string name; ///< of what the map was made from
+  ExtractionOptions options;
+  Sensor sensor; ///< with the camera of the last frame
+  std::optional<CloudFileInfo> file; ///< how the last frame was read
+  PointAccounting points; ///< of all frames
+  std::vector<std::string> notices; ///< each once
+
+  void addFrame(const ExtractionResult& frame);
+
+  /// \return whether nobody has said so before.
+  bool addNotice(const std::string& notice);
+};
+
 /// The patches of a map as fits: their types, and bounds.
 std::vector<FitResult> fitsOf(const PatchMap& map, const FitOptions& options);
 
 /// Writes all files or none.
-/// \param name of what the map was made from.
 /// \param fits of its patches, as fitsOf().
 /// \throw std::runtime_error "PATH: cause".
 void writeMap(const PatchMap& map,
-              const Sensor& sensor,
-              const ExtractionOptions& options,
-              const std::string& name,
+              const MapSource& source,
               const std::vector<FitResult>& fits,
               const MapOutput& output);
 

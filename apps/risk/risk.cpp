@@ -1,4 +1,5 @@
 #include "commands.h"
+#include "common_options.h"
 #include "console.h"
 #include "risk/risk_layers.h"
 #include "risk/risk_report.h"
@@ -115,6 +116,7 @@ void
 runRisk(const CLI::App& command, RiskSettings& settings)
 {
   finishRiskOptions(command, settings);
+  requireNoInput(settings.layers, {settings.source});
   const RiskReport report = ranked(settings);
   if (!settings.load_given && !settings.quiet)
     noteLoad(report);

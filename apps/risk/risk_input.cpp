@@ -50,7 +50,10 @@ groundOfCloud(const RiskSettings& settings, const Foot& foot)
   RangeCloud cloud =
       loadCloud(settings.source, loadOptions(settings.input, sensor), &file);
   ground.notices = inputNotices(settings.input, file);
-  const Sensor taken_by = sensorOf(file, sensor);
+  std::string notice;
+  const Sensor taken_by = matchedSensor(sensorOf(file, sensor), cloud, &notice);
+  if (!notice.empty())
+    ground.notices.push_back(notice);
   cloud = withoutPatternMap(settings.source, cloud, taken_by, ground.notices);
   ground.file = file;
   ground.offset = cloud.offset;
@@ -65,9 +68,13 @@ groundOfCloud(const RiskSettings& settings, const Foot& foot)
   const MappingOptions options = mappingOptionsFor(taken_by, extraction);
   ExtractionResult result;
   ground.map = mapOfCloud(cloud, taken_by, options, &result);
+  ground.points = result.points;
+  ground.viewpoint_is_credible = result.viewpoint_is_credible;
   ground.notices.insert(ground.notices.end(),
                         result.notices.begin(),
                         result.notices.end());
+  if (const auto assumed = assumedViewpoint(cloud, result.viewpoint_is_credible))
+    ground.notices.push_back(*assumed);
   return ground;
 }
 

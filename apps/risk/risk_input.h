@@ -6,6 +6,7 @@
 #include <holdfast/contact/foot.h>
 #include <holdfast/fusion/patch_map.h>
 #include <holdfast/io/cloud_io.h>
+#include <holdfast/pcl/point_accounting.h>
 
 #include <optional>
 #include <string>
@@ -21,6 +22,8 @@ struct Ground {
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();
   /// Down in the image, where the frame is that of a camera and of nothing else.
   std::optional<Eigen::Vector3d> image_down;
+  PointAccounting points; ///< of the cloud
+  bool viewpoint_is_credible = true;
   double radius_m = 0.0; ///< of the patches
   std::vector<std::string> notices;
 };

@@ -212,8 +212,12 @@ writeRiskJson(std::ostream& out, const RiskReport& report)
              {{"yaws", report.options.yaws}, {"spacing_m", report.options.spacing_m}}},
             {"assumptions", assumptions},
             {"ranking", rankingJson(report.ranking)}};
-  if (ground.file)
+  head["notices"] = ground.notices;
+  if (ground.file) {
     head["input"] = io::inputJson(*ground.file);
+    head["cloud_points"] = io::pointsJson(ground.points);
+    head["sensor"]["viewpoint_credible"] = ground.viewpoint_is_credible;
+  }
   std::string opening = text(head);
   opening.pop_back(); // the brace, for the lists to follow
   out << opening;

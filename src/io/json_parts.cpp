@@ -63,6 +63,18 @@ patternJson(const NoisePattern& pattern)
   return waves;
 }
 
+Json
+pointsJson(const PointAccounting& points)
+{
+  return {{"in_file", points.in_cloud},
+          {"invalid", points.invalid},
+          {"behind_camera", points.behind_camera},
+          {"out_of_view", points.out_of_view},
+          {"invalid_covariance", points.invalid_covariance},
+          {"duplicate", points.duplicate},
+          {"used", points.used}};
+}
+
 double
 positiveFromJson(const nlohmann::json& json, const char* name)
 {

@@ -1,8 +1,9 @@
-/// \file Vectors, poses, cameras and patterns, which all results tell alike.
+/// \file Vectors, poses, cameras, patterns and points, which all results tell alike.
 #pragma once
 
 #include <holdfast/geometry/pose.h>
 #include <holdfast/noise_pattern.h>
+#include <holdfast/pcl/point_accounting.h>
 #include <holdfast/sensor/camera.h>
 
 #include <nlohmann/json.hpp>
@@ -59,6 +60,9 @@ Camera cameraFromJson(const nlohmann::json& json);
 /// Sigmas in the unit of the noise model: px of disparity for stereo, m at 1 m for
 /// others.
 nlohmann::ordered_json patternJson(const NoisePattern& pattern);
+
+/// "cloud_points".
+nlohmann::ordered_json pointsJson(const PointAccounting& points);
 
 /// \throw nlohmann::json::exception, or std::runtime_error when the member is not
 /// positive and finite.

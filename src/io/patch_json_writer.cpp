@@ -43,18 +43,6 @@ sensorJson(const PatchReport& report)
   return json;
 }
 
-Json
-pointsJson(const PointAccounting& points)
-{
-  return {{"in_file", points.in_cloud},
-          {"invalid", points.invalid},
-          {"behind_camera", points.behind_camera},
-          {"out_of_view", points.out_of_view},
-          {"invalid_covariance", points.invalid_covariance},
-          {"duplicate", points.duplicate},
-          {"used", points.used}};
-}
-
 /// Null where there is none.
 template <typename T>
 Json
@@ -421,7 +409,7 @@ writeJson(std::ostream& out, const PatchReport& report, JsonLayout layout)
     member("input", io::inputJson(*report.file));
   member("sensor", sensorJson(report));
   member("offset", io::vectorJson(report.offset));
-  member("cloud_points", pointsJson(report.result.points));
+  member("cloud_points", io::pointsJson(report.result.points));
   member("notices", report.result.notices);
   member("options", optionsJson(report));
   out << "\"patches\":[" << gap;

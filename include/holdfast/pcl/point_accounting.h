@@ -23,6 +23,8 @@ struct PointAccounting {
   {
     return in_cloud - invalid;
   }
+
+  PointAccounting& operator+=(const PointAccounting& other);
 };
 
 /// "12 of 500 points are left out: 10 behind the camera, 2 duplicates"; empty when
