@@ -57,8 +57,8 @@ offsetOf(const std::vector<double>& xyz)
     return none;
   // Medians: single points far away do not move them.
   Eigen::Vector3d middle = none;
-  double spread =
-      0.0; // of the coordinate that varies most, three quarters of its points
+  // Of the coordinate that varies most, for three quarters of the points.
+  double spread = 0.0;
   std::vector<double> values;
   for (int axis = 0; axis < 3; ++axis) {
     values.clear();
