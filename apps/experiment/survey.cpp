@@ -1,5 +1,7 @@
 #include "survey.h"
 
+#include "parallel/thread_memory.h"
+
 #include <pcl/common/common.h>
 
 #include <Eigen/Eigenvalues>
@@ -36,8 +38,8 @@ SurveyedSurface::SurveyedSurface(const pcl::PointCloud<pcl::PointXYZ>::ConstPtr&
 SurveyedSurface::Plane
 SurveyedSurface::planeNear(const Eigen::Vector3d& position) const
 {
-  thread_local std::vector<int> indices;
-  thread_local std::vector<float> squared_distances;
+  auto& indices = threadMemory<std::vector<int>, struct NearestIndices>();
+  auto& squared_distances = threadMemory<std::vector<float>, struct NearestDistances>();
   pcl::PointXYZ query;
   query.getVector3fMap() = position.cast<float>();
   tree_.nearestKSearch(query, kNeighbors, indices, squared_distances);

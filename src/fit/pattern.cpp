@@ -4,6 +4,8 @@
 
 #include "surface_fit.h"
 
+#include "parallel/thread_memory.h"
+
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
@@ -156,7 +158,7 @@ PatternSupport::writeCovariance(const CorrelatedNoise& noise,
     double variance, means[kCells];
   };
   // Kept between patches: no allocation once they have seen the most.
-  thread_local std::vector<Wave> waves;
+  auto& waves = threadMemory<std::vector<Wave>, struct Waves>();
   waves.resize(noise.components().size());
   std::size_t count = 0;
   for (const CorrelatedNoise::Component& component : noise.components())

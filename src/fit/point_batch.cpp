@@ -1,4 +1,7 @@
 #include "surface_fit.h"
+
+#include "parallel/thread_memory.h"
+
 #include <holdfast/fit/point_batch.h>
 #include <holdfast/geometry/gaussian.h>
 
@@ -189,7 +192,7 @@ PointBatch::removeUninformative()
   if (tracesAreAlike(*this))
     return 0;
   // Kept between neighbourhoods: no allocation once it has seen the largest.
-  thread_local std::vector<double> traces;
+  auto& traces = threadMemory<std::vector<double>, struct Traces>();
   traces.resize(static_cast<std::size_t>(size_));
   for (int i = 0; i < size_; ++i)
     traces[static_cast<std::size_t>(i)] = traceOf(*this, i);

@@ -6,6 +6,7 @@
 #include "geometry/small_cholesky.h"
 #include "geometry/symmetric.h"
 #include "geometry/symmetric_eigen.h"
+#include "parallel/thread_memory.h"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
@@ -383,7 +384,7 @@ moveOnto(const UnboundedSurface& surface,
 double
 takenUpWithoutResiduals(const SurfaceProblem& problem, const UnboundedSurface& surface)
 {
-  thread_local PaddedRows moved;
+  auto& moved = threadMemory<PaddedRows, struct MovedPoints>();
   moved.resize(3, problem.points.padded_size);
   double* const onto[3] = {moved.row(0), moved.row(1), moved.row(2)};
   moveOnto(surface, problem.points, onto);

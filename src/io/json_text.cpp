@@ -1,5 +1,7 @@
 #include "json_text.h"
 
+#include "parallel/thread_memory.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -62,8 +64,9 @@ appendJsonMatrix(const Eigen::Ref<const Eigen::MatrixXd>& matrix, std::string& o
   // One append for all of it: those of single numbers add up.
   const Eigen::Index n = matrix.cols();
   const auto entries = static_cast<std::size_t>(matrix.size());
-  thread_local std::vector<char> text;
-  thread_local std::vector<Printed> printed; // row by row
+  auto& text = threadMemory<std::vector<char>, struct MatrixText>();
+  auto& printed =
+      threadMemory<std::vector<Printed>, struct PrintedRows>(); // row by row
   text.resize(std::max(text.size(),
                        kNumberSize * (entries + 1) +
                            3 * static_cast<std::size_t>(matrix.rows())));

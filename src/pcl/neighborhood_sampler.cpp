@@ -9,6 +9,7 @@
 #include "seeds.h"
 #include "surface_patch.h"
 
+#include "parallel/thread_memory.h"
 #include "validation/patch_rays.h"
 
 #include <pcl/common/point_tests.h>
@@ -548,7 +549,7 @@ NeighborhoodSampler::Impl::strayShare(int seed, const Patch& patch) const
   const double pixels = static_cast<double>(columns) * rows;
   const int step = std::max(1, static_cast<int>(std::sqrt(pixels / kPixels)));
   // Kept between patches: no allocation once it has seen the largest window.
-  thread_local PatchRays rays;
+  auto& rays = threadMemory<PatchRays, struct RaysOfWindow>();
   rays.clear();
   const int first = window.columns.begin + step / 2;
   const int per_row = (window.columns.end - first + step - 1) / step;

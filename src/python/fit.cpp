@@ -7,6 +7,7 @@
 #include "sensor_object.h"
 
 #include "parallel/parallel_for.h"
+#include "parallel/thread_memory.h"
 
 #include <algorithm>
 #include <chrono>
@@ -91,7 +92,7 @@ fillBatch(const Task& task, const Settings& settings, PointBatch& batch)
 bool
 fitTask(const Task& task, const Settings& settings, ExtractedPatch& patch)
 {
-  thread_local PointBatch batch; // keeps its memory from call to call
+  auto& batch = threadMemory<PointBatch, struct FittedPoints>();
   fillBatch(task, settings, batch);
   patch.fit = settings.estimator.estimate(batch);
   return patch.fit.invalid_points == 0;

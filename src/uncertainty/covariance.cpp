@@ -4,6 +4,7 @@
 
 #include "fit/models/models.h"
 #include "geometry/symmetric.h"
+#include "parallel/thread_memory.h"
 
 #include "second_order.h"
 #include "stagewise.h"
@@ -97,7 +98,8 @@ StageGradients
 stageGradients(const PatchFit& fit, const PointBatch& batch, Residual residual)
 {
   // Kept between patches: no allocation once they have seen the largest.
-  thread_local std::vector<double> X, Xp;
+  auto& X = threadMemory<std::vector<double>, struct SurfaceTerms>();
+  auto& Xp = threadMemory<std::vector<double>, struct PlaneTerms>();
   const kernel::Points points = kernelPoints(batch);
   const auto fill = [&](const UnboundedSurface& surface, std::vector<double>& terms) {
     kernel::crossTerms(surface.model,

@@ -1,5 +1,7 @@
 #include "fit/fit_patch.h"
 #include "parallel/parallel_for.h"
+#include "parallel/thread_memory.h"
+
 #include <holdfast/geometry/gaussian.h>
 
 #include <holdfast/uncertainty/monte_carlo.h>
@@ -176,7 +178,7 @@ monteCarloCovariance(const Patch& reference,
   std::vector<std::optional<Trial>> trials(
       static_cast<std::size_t>(monte_carlo.trials));
   const auto work = [&](int trial, int) {
-    thread_local PointBatch drawn;
+    auto& drawn = threadMemory<PointBatch, struct DrawnPoints>();
     std::mt19937_64 generator =
         trialGenerator(monte_carlo.seed, static_cast<std::uint64_t>(trial));
     drawPoints(model, generator, drawn);

@@ -3,6 +3,7 @@
 #include "patch_form.h"
 
 #include "fit/surface_fit.h"
+#include "parallel/thread_memory.h"
 
 #include <algorithm>
 #include <cmath>
@@ -17,7 +18,7 @@ LocalPoints::LocalPoints(const Patch& patch, const PointBatch& points)
 
 LocalPoints::LocalPoints(const Patch& patch, const std::vector<Eigen::Vector3d>& points)
 {
-  thread_local PointBatch batch;
+  auto& batch = threadMemory<PointBatch, struct PlacedPoints>();
   batch.clear(patch.c);
   batch.resize(static_cast<int>(points.size()));
   for (int c = PointBatch::SXX; c <= PointBatch::SZZ; ++c)
@@ -33,7 +34,7 @@ void
 LocalPoints::place(const Patch& patch, const PointBatch& points)
 {
   // Kept between patches: no allocation once they have seen the largest.
-  thread_local std::vector<double> memory;
+  auto& memory = threadMemory<std::vector<double>, struct PlacedRows>();
   const auto rows = static_cast<std::size_t>(points.paddedSize());
   if (memory.size() < 6 * rows)
     memory.resize(6 * rows);
