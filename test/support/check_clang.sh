@@ -11,7 +11,9 @@ folder=${1:-$root/build-clang}
 cmake -S "$root" -B "$folder" -G Ninja -DCMAKE_CXX_COMPILER=clang++ \
   -DCMAKE_BUILD_TYPE=Release -DHOLDFAST_WERROR=ON -DHOLDFAST_PRECOMPILE_HEADERS=ON \
   -DHOLDFAST_BUILD_BENCHMARKS=OFF -DCMAKE_EXPORT_COMPILE_COMMANDS=ON >/dev/null
-ninja -C "$folder" -t targets all | sed -n 's/^\(.*cmake_pch\.hxx\.pch\): .*/\1/p' |
+# What sources include that the build makes: precompiled headers, messages of ROS.
+ninja -C "$folder" -t targets all |
+  sed -n -e 's/^\(.*cmake_pch\.hxx\.pch\): .*/\1/p' -e 's/^\([a-z_]*_files\): .*/\1/p' |
   xargs ninja -C "$folder"
 
 # Each on a line.
