@@ -29,7 +29,8 @@ case ${1:-} in
 --thread)
   folder=$root/build-sanitize-thread
   sanitizers=thread
-  tests=(patch_extraction frame_extraction monte_carlo consistency openni2_grabber)
+  tests=(patch_extraction frame_extraction monte_carlo consistency openni2_grabber
+    thread_memory)
   shift
   ;;
 esac
