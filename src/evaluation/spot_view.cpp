@@ -109,7 +109,7 @@ SpotView::SpotView(const Scene& scene,
 {
   Scene seen = scene;
   seen.sensor_pose = sensor_pose;
-  Eigen::Vector2i first;
+  Eigen::Vector2i first = Eigen::Vector2i::Zero();
   const RayGrid rays = raysAround(sensor.camera,
                                   sensor_pose.toLocal(disc.c),
                                   1.5 * radius_m,
