@@ -43,9 +43,8 @@ if ((${#tests[@]})); then
 fi
 
 install_packages build test
-# Without Highway, whose vectors take sanitizers minutes to compile. Little optimisation,
-# line numbers alone and several sources at a time: what is looked for is found with
-# them, and it compiles sooner.
+# Without Highway, whose vectors take sanitizers minutes to compile. Little optimisation
+# and line numbers alone: what is looked for is found with them, and it compiles sooner.
 build_in "$folder" -DCMAKE_BUILD_TYPE=RelWithDebInfo \
   -DCMAKE_CXX_FLAGS_RELWITHDEBINFO="-O1 -g1 -DNDEBUG" \
   -DHOLDFAST_SANITIZE="$sanitizers" -DHOLDFAST_WITH_HIGHWAY=OFF \

@@ -535,7 +535,7 @@ TEST_F(CloudDialects, PointsAboutTheOriginAreNotShifted)
   Loaded loaded = load(cloudOf(rows));
   EXPECT_TRUE(loaded.cloud.offset.isZero(0.0));
   EXPECT_EQ(loaded.notices(), "");
-  // A room in millimetres likewise: its unit is to be recognised.
+  // A room in micrometres likewise: its unit is to be recognised.
   loaded = load(cloudOf(replaced(replaced(rows, ".", ""), " 0", " ")));
   EXPECT_TRUE(loaded.cloud.offset.isZero(0.0));
 }

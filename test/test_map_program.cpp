@@ -111,6 +111,7 @@ TEST_F(MapProgram, WritesTheMapInEveryForm)
   EXPECT_EQ(object.at("cloud_points").at("in_file"), 4 * 160 * 120);
   EXPECT_GT(object.at("cloud_points").at("used"), 0);
   EXPECT_EQ(object.at("sensor").at("camera").at("width"), 160);
+  EXPECT_EQ(object.at("sensor").at("name"), "kinect_v1");
   EXPECT_EQ(object.at("input").at("unit_m"), 1.0);
   EXPECT_NE(object.at("notices").dump().find("--pose-sigma"), std::string::npos);
   EXPECT_GT(fs::file_size(ply), 0u);

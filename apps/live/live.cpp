@@ -160,8 +160,11 @@ LiveSession::LiveSession(const LiveSettings& settings, Openni2Grabber& grabber)
     throw std::runtime_error("frames of " + error);
   if (!settings.output_folder.empty())
     makeFrameFolder(settings.output_folder);
-  if (!settings.map_files.empty())
+  if (!settings.map_files.empty()) {
     mapper_.emplace(sensor_, mappingOptionsFor(sensor_, settings.extraction.options));
+    map_source_.sensor = sensor_;
+    map_source_.options = settings.extraction.options;
+  }
   if (settings.view)
     view_.emplace();
   if (!settings.json_path.empty())
@@ -196,7 +199,6 @@ LiveSession::finish()
   if (map.patches().empty())
     throw std::runtime_error("no patch in any frame: no map is written");
   map_source_.name = fmt::format("map of {} frames", map.frames());
-  map_source_.options = settings_.extraction.options;
   writeMap(map,
            map_source_,
            fitsOf(map, settings_.extraction.options.fit),

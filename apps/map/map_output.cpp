@@ -48,7 +48,7 @@ void
 MapSource::addFrame(const ExtractionResult& frame)
 {
   points += frame.points;
-  sensor = frame.sensor;
+  sensor.camera = frame.sensor.camera;
   for (const std::string& notice : frame.notices)
     addNotice(notice);
 }

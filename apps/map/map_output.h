@@ -24,7 +24,9 @@ struct MapOutput {
 struct MapSource {
   std::string name; ///< of what the map was made from
   ExtractionOptions options;
-  Sensor sensor; ///< with the camera of the last frame
+  /// The one asked for, whatever noise was assumed in a frame, by whose name the map
+  /// goes on; with the camera of the last frame.
+  Sensor sensor;
   std::optional<CloudFileInfo> file; ///< how the last frame was read
   PointAccounting points; ///< of all frames
   std::vector<std::string> notices; ///< each once

@@ -66,13 +66,10 @@ bool
 repeatsPixels(const pcl::PointCloud<pcl::PointXYZ>& points)
 {
   constexpr std::uint32_t kStep = 7; // rows: enough, and of either parity
-  const auto isSame = [](const pcl::PointXYZ& a, const pcl::PointXYZ& b) {
-    return a.x == b.x && a.y == b.y && a.z == b.z; // never when NaN
-  };
   for (std::uint32_t v = 1; v < points.height; v += kStep)
     for (std::uint32_t u = 1; u < points.width; ++u)
-      if (isSame(points(u, v), points(u - 1, v)) ||
-          isSame(points(u, v), points(u, v - 1)))
+      if (isSamePlace(points(u, v), points(u - 1, v)) ||
+          isSamePlace(points(u, v), points(u, v - 1)))
         return true;
   return false;
 }

@@ -29,13 +29,13 @@ hashOf(const pcl::PointXYZ& p)
   return static_cast<std::size_t>(hash ^ (hash >> 32));
 }
 
+} // namespace
+
 bool
 isSamePlace(const pcl::PointXYZ& a, const pcl::PointXYZ& b)
 {
   return a.x == b.x && a.y == b.y && a.z == b.z;
 }
-
-} // namespace
 
 UnusedPoints::UnusedPoints(const RangeCloud& cloud) : cloud_(cloud)
 {

@@ -8,6 +8,9 @@
 
 namespace holdfast {
 
+/// Never where one is NaN.
+bool isSamePlace(const pcl::PointXYZ& a, const pcl::PointXYZ& b);
+
 /// Refers to the cloud.
 class UnusedPoints {
 public:
